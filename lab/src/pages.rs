@@ -68,8 +68,12 @@ pub fn documents(
             documents.push((kept.into(), part.to_json()?));
             anyhow::Ok(part)
         };
-        let mut part = taken("few", 0..few_seeds, rerun != Rerun::None)?;
+        let few = taken("few", 0..few_seeds, rerun != Rerun::None)?;
         let rest = taken("rest", few_seeds..all_seeds, rerun == Rerun::All)?;
+        // Only parts with the points of the study can be added.
+        let mut part = Part::empty(study);
+        part.add(&few)
+            .with_context(|| format!("{name}: the stored few"))?;
         part.add(&rest)
             .with_context(|| format!("{name}: the stored rest"))?;
         ensure!(

@@ -10,6 +10,7 @@
 //!   → [`merge`]  parts of disjoint seeds as one
 //! ```
 
+pub mod charts;
 pub mod mean;
 mod part;
 pub mod results;
@@ -101,6 +102,12 @@ pub fn grid<const N: usize>(parameters: [(&str, &[f64]); N]) -> Vec<Point> {
         points = longer.collect();
     }
     points
+}
+
+/// The numbers of so many scenes, from 0, as values of a parameter.
+#[must_use]
+pub fn numbers(count: usize) -> Vec<f64> {
+    (0u16..).map(f64::from).take(count).collect()
 }
 
 /// A parameter that is a small whole number.

@@ -14,7 +14,7 @@ use dtof_draw::svg::{Anchor, BOLD, EDGE, Svg, TEXT, TITLE, text_width, wrapped};
 /// The rows of the table: those in which a method fails or degrades.
 ///
 /// # Errors
-/// Fails if `part` is of another study.
+/// As [`outcomes`].
 pub fn table(part: &Part) -> Result<Values> {
     let all = outcomes(part)?;
     let mut table = String::new();
@@ -33,7 +33,7 @@ pub fn table(part: &Part) -> Result<Values> {
 /// Every case with its row, as CSV.
 ///
 /// # Errors
-/// Fails if `part` is of another study.
+/// As [`outcomes`].
 pub fn cases(part: &Part) -> Result<String> {
     let mut csv = "case,row,fails,holds,advice,why_no_flag\n".to_owned();
     for (case, outcomes) in &outcomes(part)? {
@@ -193,7 +193,7 @@ const NOTE: &str = "Fails: a tenth of the events or more are false alarms, or ha
 /// The matrix of rules and rows.
 ///
 /// # Errors
-/// Fails if `part` is of another study, or if the data no longer support the title.
+/// As [`outcomes`], and fails if the data no longer support the title.
 pub fn picture(part: &Part) -> Result<String> {
     let outcomes = outcomes(part)?;
     ensure!(holds(&outcomes), "the data no longer support: {FINDING}");

@@ -11,6 +11,7 @@ pub mod echo_wait;
 pub mod echoes;
 mod light;
 pub mod neighbours;
+mod scene_file;
 mod setting;
 mod simulated_array;
 pub mod tracking;

@@ -9,9 +9,10 @@ pub(super) mod stray;
 
 use self::cases::{BACKGROUNDS, background_name, cases};
 use crate::studies::scenes::one_pixel::{PER_BIN, in_parts};
+use crate::sweep::charts::{joined, joined_key, panel};
 use crate::sweep::mean::{add, add_error};
 use crate::sweep::results::{Figure, Results};
-use crate::sweep::{Part, Point, Study, Tally, grid, whole};
+use crate::sweep::{Part, Point, Study, Tally, grid, numbers, whole};
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
@@ -19,7 +20,7 @@ use dtof_core::{
     OncePerBin, PaperRule, PixelAddress, PixelConfig, Statistics, WindowRule, z_for,
 };
 use dtof_data::options::rows::grouped;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
+use dtof_draw::chart::{Axis, Chart};
 use dtof_draw::palette::{self, Pen};
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
@@ -166,8 +167,7 @@ impl Method {
 
 fn points() -> Vec<Point> {
     let count = cases().map_or(0, |cases| cases.len());
-    let numbers = (0u32..).map(f64::from).take(count);
-    grid([("case", &numbers.collect::<Vec<f64>>())])
+    grid([("case", &numbers(count))])
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
@@ -266,12 +266,9 @@ fn results(part: &Part) -> Result<Results> {
             };
             let dots = BACKGROUNDS.into_iter();
             let dots = dots.filter_map(|at| Some(share(rule, at, is_weak)?.aside(steps)));
-            Series::unnamed(rule.pen(), Style::JoinedDots, dots.collect())
+            joined(rule.pen(), dots)
         });
-        Panel {
-            title: title.to_owned(),
-            series: series.into(),
-        }
+        panel(title, series)
     });
     // The largest share of false events with a weak signal.
     let most = |rule| {
@@ -288,12 +285,12 @@ fn results(part: &Part) -> Result<Results> {
             .percent()
             .within(0.0, 0.03),
         key: Rule::ALL
-            .map(|rule| Key::new(rule.pen(), Style::JoinedDots, rule.name()))
+            .map(|rule| joined_key(rule.pen(), rule.name()))
             .into(),
         columns: 2,
         panels: panels.into(),
     };
-    let exposures = part.one([])?.count("exposures");
+    let exposures = part.one([]).count("exposures");
     Ok(Results {
         figures: vec![Figure::new("failures-background", &chart)?],
         values: [("exposures", grouped(exposures))].into(),

@@ -10,9 +10,14 @@ use dtof_light::counts::binomial;
 /// Standard deviations of an interval that holds 99 %.
 pub const Z_99: f64 = 2.575_829_303_548_9;
 
-/// Adds `amount` to a count.
+/// Adds `amount` to the count `what` of `name`.
 pub fn add(tally: &mut Tally, name: &str, what: &str, amount: u64) {
-    let sum = tally.entry(format!("{name} {what}")).or_default();
+    add_count(tally, &format!("{name} {what}"), amount);
+}
+
+/// Adds `amount` to a count.
+pub fn add_count(tally: &mut Tally, name: &str, amount: u64) {
+    let sum = tally.entry(name.to_owned()).or_default();
     *sum = sum.saturating_add(amount);
 }
 
@@ -55,6 +60,15 @@ fn mean_and_half(values: u128, sum: i128, squares: u128) -> (f64, f64) {
 }
 
 impl Measured {
+    /// With an interval of `half` on either side.
+    #[must_use]
+    pub const fn plus_minus(value: f64, half: f64) -> Self {
+        Self {
+            value,
+            interval: (value - half, value + half),
+        }
+    }
+
     /// The share of `successes` in `trials`, with the Clopper-Pearson interval (at least 99 %) of
     /// the probability.
     #[must_use]
@@ -94,10 +108,7 @@ impl Measured {
         let count = |what: &str| point.count(&format!("{name} {what}"));
         let sum = i128::from(count("above 0")) - i128::from(count("below 0"));
         let (value, half) = mean_and_half(count("values").into(), sum, count("squares").into());
-        Self {
-            value,
-            interval: (value - half, value + half),
-        }
+        Self::plus_minus(value, half)
     }
 
     /// The root mean square of the errors of `name`. NaN without errors.
@@ -133,11 +144,14 @@ impl Measured {
     pub fn over(self, other: Self) -> Self {
         let share = |part: Self| (part.interval.1 - part.interval.0) / 2.0 / part.value;
         let value = self.value / other.value;
-        let half = value * share(self).hypot(share(other));
-        Self {
-            value,
-            interval: (value - half, value + half),
-        }
+        Self::plus_minus(value, value * share(self).hypot(share(other)))
+    }
+
+    /// Value and half of the interval with `digits` decimals, as text.
+    #[must_use]
+    pub fn with_half(&self, digits: usize) -> String {
+        let half = (self.interval.1 - self.interval.0) / 2.0;
+        format!("{:.digits$} ±{half:.digits$}", self.value)
     }
 
     /// Value and interval with `digits` decimals, as text.

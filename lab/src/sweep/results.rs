@@ -3,7 +3,7 @@
 use super::mean::Measured;
 use super::values::Values;
 use super::{Part, PointTally};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use dtof_draw::chart::{self, Chart};
 use dtof_light::counts::poisson::Poisson;
 use std::fmt;
@@ -193,6 +193,20 @@ impl PointTally {
         Measured::share(self.count(successes), self.count(trials))
     }
 
+    /// These parameters as cells of a CSV table.
+    #[must_use]
+    pub fn parameter_cells<const N: usize>(&self, names: [&str; N]) -> String {
+        let cells = names.map(|name| self.parameter(name).to_string());
+        cells.join(",")
+    }
+
+    /// These counts as cells of a CSV table.
+    #[must_use]
+    pub fn count_cells<const N: usize>(&self, names: [&str; N]) -> String {
+        let cells = names.map(|name| self.count(name).to_string());
+        cells.join(",")
+    }
+
     /// Whether the point has these parameters.
     #[must_use]
     pub fn is_at<const N: usize>(&self, parameters: [(&str, f64); N]) -> bool {
@@ -211,13 +225,14 @@ impl Part {
         points.filter(move |point| point.is_at(parameters))
     }
 
-    /// The point with these parameters.
+    /// The point with these parameters, the first if there are several.
     ///
-    /// # Errors
-    /// Fails if there is no such point.
-    pub fn one<const N: usize>(&self, parameters: [(&str, f64); N]) -> Result<&PointTally> {
+    /// # Panics
+    /// If the study has no such point.
+    #[must_use]
+    pub fn one<const N: usize>(&self, parameters: [(&str, f64); N]) -> &PointTally {
         let found = self.points().iter().find(|point| point.is_at(parameters));
-        found.with_context(|| format!("{}: no point {parameters:?}", self.study()))
+        found.unwrap_or_else(|| panic!("{}: no point {parameters:?}", self.study()))
     }
 }
 

@@ -1,7 +1,5 @@
 //! Another LiDAR, and the dither against it.
 
-use std::fmt::Write as _;
-
 use anyhow::{Result, ensure};
 
 use crate::studies::beyond::dither::{
@@ -13,11 +11,9 @@ use crate::sweep::values::Values;
 
 /// The section on the study of the dither.
 pub(super) fn section(values: &mut Values, part: &Part) -> Result<()> {
-    values.set("lidar.table", table(part)?);
-    values.set(
-        "lidar.without",
-        cell(|scene| undisturbed(part, scene, Counted::All))?,
-    );
+    values.set("lidar.table", table(part));
+    let without = |scene| undisturbed(part, scene, Counted::All);
+    values.set("lidar.without", cell(without));
     values.set("lidar.default", DEFAULT);
     values.set("lidar.most wrong", 100.0 * MOST_WRONG);
     values.set("lidar.most false", 100.0 * MOST_FALSE);
@@ -32,26 +28,23 @@ pub(super) fn section(values: &mut Values, part: &Part) -> Result<()> {
         ("clock equal", Scene::EqualClock, Counted::All, 1.0),
         ("clock twice", Scene::EqualClock, Counted::All, 2.0),
     ] {
-        let outcome = at(scene, counted, strength)?;
+        let outcome = at(scene, counted, strength);
         values.set(format!("lidar.{name}"), percent(outcome, 1));
     }
-    let alone = undisturbed(part, Scene::Target, Counted::All)?.cycles.value;
-    let ratio = at(Scene::Target, Counted::All, 2.0)?.cycles.value / alone;
+    let alone = without(Scene::Target).cycles.value;
+    let ratio = at(Scene::Target, Counted::All, 2.0).cycles.value / alone;
     values.set("lidar.time", format!("{ratio:.2}"));
-    values.set(
-        "lidar.first without",
-        first_cell(|scene| undisturbed(part, scene, Counted::First))?,
-    );
-    values.set("lidar.first table", first_table(part)?);
-    let without = undisturbed(part, Scene::Empty, Counted::All)?;
+    let first_without = first_cell(|scene| undisturbed(part, scene, Counted::First));
+    values.set("lidar.first without", first_without);
+    values.set("lidar.first table", first_table(part));
+    let without = without(Scene::Empty);
     values.set("lidar.alone", percent(without, 1));
     let without = without.wrong;
-    let [equal, twice] = [1.0, 2.0].map(|strength| at(Scene::Empty, Counted::All, strength));
-    let (equal, twice) = (equal?.wrong, twice?.wrong);
+    let [equal, twice] = [1.0, 2.0].map(|strength| at(Scene::Empty, Counted::All, strength).wrong);
     ensure!(
         equal.contains(without.value)
             && twice.interval.0 > without.interval.1
-            && least_range(part, Scene::Empty, Counted::All, 1.0)? == Some(DEFAULT),
+            && least_range(part, Scene::Empty, Counted::All, 1.0) == Some(DEFAULT),
         "the data no longer show which LiDAR the default suits"
     );
     Ok(())
@@ -62,39 +55,39 @@ fn percent(outcome: DitherOutcome, digits: usize) -> String {
 }
 
 /// With a target, without one, and without one in the dark.
-fn cell(of: impl Fn(Scene) -> Result<DitherOutcome>) -> Result<String> {
-    let [target, empty, dark] = [Scene::Target, Scene::Empty, Scene::Dark].map(of);
-    Ok(format!(
+fn cell(of: impl Fn(Scene) -> DitherOutcome) -> String {
+    format!(
         "{} · {} · {}",
-        percent(target?, 2),
-        percent(empty?, 1),
-        percent(dark?, 1)
-    ))
+        percent(of(Scene::Target), 2),
+        percent(of(Scene::Empty), 1),
+        percent(of(Scene::Dark), 1)
+    )
 }
 
 /// Of a TDC of the first photon: laser cycles to an event, wrong events and, without a target, false alarms.
-fn first_cell(of: impl Fn(Scene) -> Result<DitherOutcome>) -> Result<String> {
-    let target = of(Scene::FirstPhoton)?;
-    Ok(format!(
+fn first_cell(of: impl Fn(Scene) -> DitherOutcome) -> String {
+    let target = of(Scene::FirstPhoton);
+    format!(
         "{:.0} · {} · {}",
         target.cycles.value,
         percent(target, 2),
-        percent(of(Scene::FirstPhotonEmpty)?, 1)
-    ))
+        percent(of(Scene::FirstPhotonEmpty), 1)
+    )
+}
+
+/// A row of a table: `cell` of each strength.
+fn row(name: &str, cell: impl Fn(f64) -> String) -> String {
+    format!("| {name} | {} |\n", STRENGTHS.map(cell).join(" | "))
 }
 
 /// A row without dither and one with the default.
-fn first_table(part: &Part) -> Result<String> {
-    let mut table = heading();
-    for range in [0.0, DEFAULT] {
-        write!(table, "| {range} |")?;
-        for strength in STRENGTHS {
-            let cell = first_cell(|scene| outcome(part, scene, Counted::First, strength, range))?;
-            write!(table, " {cell} |")?;
-        }
-        writeln!(table)?;
-    }
-    Ok(table)
+fn first_table(part: &Part) -> String {
+    let rows = [0.0, DEFAULT].map(|range| {
+        row(&range.to_string(), |strength| {
+            first_cell(|scene| outcome(part, scene, Counted::First, strength, range))
+        })
+    });
+    heading() + &rows.concat()
 }
 
 /// The names of the strengths.
@@ -105,7 +98,7 @@ fn heading() -> String {
 }
 
 /// A row for each range, and the smallest that suffices.
-fn table(part: &Part) -> Result<String> {
+fn table(part: &Part) -> String {
     let mut table = heading();
     let all = RANGES.map(|range| (range.to_string(), Counted::All, range));
     let once = (
@@ -114,12 +107,9 @@ fn table(part: &Part) -> Result<String> {
         DEFAULT,
     );
     for (name, counted, range) in all.into_iter().chain([once]) {
-        write!(table, "| {name} |")?;
-        for strength in STRENGTHS {
-            let cell = cell(|scene| outcome(part, scene, counted, strength, range))?;
-            write!(table, " {cell} |")?;
-        }
-        writeln!(table)?;
+        table += &row(&name, |strength| {
+            cell(|scene| outcome(part, scene, counted, strength, range))
+        });
     }
     for (name, empty, counted) in [
         ("least S", Scene::Empty, Counted::All),
@@ -130,14 +120,10 @@ fn table(part: &Part) -> Result<String> {
             Counted::OncePerBin,
         ),
     ] {
-        write!(table, "| {name} |")?;
-        for strength in STRENGTHS {
-            match least_range(part, empty, counted, strength)? {
-                Some(range) => write!(table, " {range} |")?,
-                None => write!(table, " none |")?,
-            }
-        }
-        writeln!(table)?;
+        table += &row(name, |strength| {
+            let least = least_range(part, empty, counted, strength);
+            least.map_or("none".to_owned(), |range| range.to_string())
+        });
     }
-    Ok(table)
+    table
 }

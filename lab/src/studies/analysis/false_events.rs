@@ -1,6 +1,7 @@
 //! False alarms of the paper's rule with its estimated background, at one look and over an
 //! exposure: the data that `dtof tune` interpolates.
 
+use crate::sweep::charts::joined_key;
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict, ends};
 use crate::sweep::{self, Part, Point, PointTally, Study, Tally};
@@ -136,7 +137,10 @@ fn results(part: &Part) -> Result<Results> {
         ],
         claims: claims(part)?,
         values: [("exposures", exposures)].into(),
-        tables: vec![("../theory/data/repeated_looks.csv", table::csv(&tallies)?)],
+        tables: vec![(
+            "../host/light/data/repeated_looks.csv",
+            table::csv(&tallies)?,
+        )],
     })
 }
 
@@ -223,7 +227,7 @@ fn chart(part: &Part, last: u32) -> Result<Chart> {
     } else {
         let text = "One α cannot hold the rate of false alarms: it changes with the background";
         let key = vec![
-            Key::new(NEUTRAL, Style::JoinedDots, "simulated"),
+            joined_key(NEUTRAL, "simulated"),
             Key::new(NEUTRAL, Style::Dashed, "Eq. 10"),
         ];
         (text, key)

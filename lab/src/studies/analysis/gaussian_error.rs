@@ -3,7 +3,7 @@
 
 use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target};
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict, ends};
-use crate::sweep::{Part, Point, Study, Tally, grid};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::Result;
 use dtof_core::paper::isqrt;
 use dtof_data::options::rows::grouped;
@@ -197,13 +197,11 @@ fn rates(part: &Part, rate: Rate) -> Chart {
         let line = |of: fn(Rate, f64, u32) -> f64| {
             Dot::curve(fine_backgrounds(), |background| of(rate, background, alpha))
         };
-        let dots = part.points().iter().map(|point| {
-            let share = point.share(&rate.name(alpha), "histograms");
-            share.at(point.parameter("background"))
-        });
+        let share = |point: &PointTally| point.share(&rate.name(alpha), "histograms");
+        let dots = part.dots([], "background", share);
         let pen = pen(alpha);
         series.extend([
-            Series::unnamed(pen, Style::Dots, dots.collect()),
+            Series::unnamed(pen, Style::Dots, dots),
             Series::named(format!("α = {alpha}"), pen, Style::Line, line(Rate::exact)),
             Series::unnamed(pen, Style::Dashed, line(Rate::gaussian)),
         ]);

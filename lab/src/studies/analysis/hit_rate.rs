@@ -1,12 +1,13 @@
 //! How often the highest bin is the pulse's (Eq. 7 and its figures).
 
 use super::paper_setting::{Histograms, gaussian, means, target};
+use crate::sweep::charts::panel;
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally};
 use anyhow::Result;
 use dtof_core::paper::ComparatorTree;
 use dtof_data::options::rows::grouped;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Key, Point as Dot, Series, Style};
 use dtof_draw::palette::NEUTRAL;
 use dtof_light::known_background;
 use rand_pcg::Pcg64;
@@ -114,19 +115,19 @@ fn comparison(part: &Part, backgrounds: &[f64], predicted: impl Fn(f64, f64) -> 
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let histograms = part.one([("snr", 1.0)])?.count("histograms");
+    let histograms = part.one([("snr", 1.0)]).count("histograms");
     Ok(Results {
         figures: vec![
-            Figure::new("hit-rate", &chart(part, 0.0)?)?,
-            Figure::new("hit-rate-neighbours", &chart(part, 1.0)?)?,
+            Figure::new("hit-rate", &chart(part, 0.0))?,
+            Figure::new("hit-rate-neighbours", &chart(part, 1.0))?,
         ],
-        claims: claims(part)?,
+        claims: claims(part),
         values: [("histograms", grouped(histograms))].into(),
         ..Results::default()
     })
 }
 
-fn claims(part: &Part) -> Result<Vec<Claim>> {
+fn claims(part: &Part) -> Vec<Claim> {
     let found: Vec<Comparison> = BACKGROUNDS
         .iter()
         .map(|&background| comparison(part, &[background], printed))
@@ -156,7 +157,7 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
     let [fewest, .., most_counts] = BACKGROUNDS;
     let of_ends = |which: usize| [levels[0], levels[levels.len() - 1]].map(|level| level[which]);
     let [printed_at, exact_at, whole_at] = [1, 0, 2].map(of_ends);
-    Ok(vec![
+    vec![
         Claim::new(
             "eq7",
             format!("off by up to {most:.3} from 30 background counts a bin on, with fewer up to {below:.3}"),
@@ -189,22 +190,19 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
             of_level(0),
             of_level(2)
         )),
-    ])
+    ]
 }
 
 /// Backgrounds of the figures.
 const SHOWN: [f64; 3] = [1.0, 10.0, 100.0];
 
 /// A panel for each background.
-fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
+fn chart(part: &Part, neighbours: f64) -> Chart {
     let with_neighbours = neighbours > 0.0;
     let snrs = (1..=30).map(f64::from);
-    let panel = |background: f64| {
-        let points = part.at([("neighbours", neighbours), ("background", background)]);
-        let dots = |of: &str| {
-            let dot = |point: &PointTally| point.share(of, "histograms").at(point.parameter("snr"));
-            points.clone().map(dot).collect()
-        };
+    let of_background = |background: f64| {
+        let at = [("neighbours", neighbours), ("background", background)];
+        let dots = |of: &str| part.dots(at, "snr", |point| point.share(of, "histograms"));
         let line = |of: &dyn Fn(f64) -> f64| Dot::curve(snrs.clone(), of);
         let exact = |snr| exact(&means(background, snr, with_neighbours));
         let series = |style, points| Series::unnamed(NEUTRAL, style, points);
@@ -222,10 +220,7 @@ fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
                 series(Style::Dashed, line(&|snr| printed(background, snr))),
             ]
         };
-        Panel {
-            title: format!("{background} background counts a bin"),
-            series,
-        }
+        panel(format!("{background} background counts a bin"), series)
     };
     let (finding, holds) = if with_neighbours {
         let alone = part.at([("neighbours", 1.0), ("snr", 30.0)]);
@@ -256,7 +251,7 @@ fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
     } else {
         Key::simulated("Eq. 7")
     };
-    Ok(Chart {
+    Chart {
         finding: finding.to_owned(),
         holds,
         note: format!(
@@ -273,6 +268,6 @@ fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
             .within(0.0, 1.0),
         key,
         columns: 3,
-        panels: SHOWN.map(panel).into(),
-    })
+        panels: SHOWN.map(of_background).into(),
+    }
 }

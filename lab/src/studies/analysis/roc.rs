@@ -137,17 +137,13 @@ fn claims(part: &Part) -> Vec<Claim> {
         curve.windows(2).all(falls)
     });
     let ends = |rate: fn(&PointTally) -> Measured, alpha| {
-        let found = part.one([("snr", 9.0), ("alpha", alpha)]);
-        found.map_or(f64::NAN, |point| rate(point).value)
+        let point = part.one([("snr", 9.0), ("alpha", alpha)]);
+        rate(point).value
     };
     // The smallest α lets most pass.
     let of_snr = SNRS.map(|snr| {
-        let found = part.one([("snr", snr), ("alpha", 0.0)]);
-        let [best, hit] = ["true", "hits"].map(|name| {
-            found
-                .as_ref()
-                .map_or(f64::NAN, |point| point.share(name, "histograms").value)
-        });
+        let point = part.one([("snr", snr), ("alpha", 0.0)]);
+        let [best, hit] = ["true", "hits"].map(|name| point.share(name, "histograms").value);
         (area(part, snr), best, hit)
     });
     let rising = of_snr.windows(2).all(|pair| pair[0].0 < pair[1].0);

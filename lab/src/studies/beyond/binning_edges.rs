@@ -3,12 +3,13 @@
 
 use super::setting::{LEVELS, SIGMA, Setting, VERDICT_HEAD, by_level, verdict_cells};
 use super::simulated_array::{Reports, SimulatedArray, verdict};
-use crate::sweep::mean::Measured;
+use crate::sweep::charts::{joined, joined_key, panel};
+use crate::sweep::mean::{Measured, add_count};
 use crate::sweep::results::{Figure, Results};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, numbers, whole};
 use anyhow::Result;
 use dtof_core::Array;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
+use dtof_draw::chart::{Axis, Chart};
 use dtof_draw::palette::{Pen, STEPS};
 use dtof_light::rates::Rates;
 use rand_distr::{Distribution, Uniform};
@@ -50,9 +51,8 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let scenes: Vec<f64> = (0u8..).take(SCENES.len()).map(f64::from).collect();
     let mut points = grid([
-        ("scene", &scenes),
+        ("scene", &numbers(SCENES.len())),
         ("levels", &LEVELS),
         ("patience", &PATIENCES),
     ]);
@@ -93,15 +93,13 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let setting = Setting::of(point)?;
     let number = usize::from(whole(point, "scene"));
     let seen = scene(number, rng)?;
-    let rates: Vec<Rates> = seen
-        .iter()
-        .map(|&(signal, position)| Rates {
-            background: BACKGROUND,
-            signal,
-            position,
-            sigma: SIGMA,
-        })
-        .collect();
+    let rates = seen.iter().map(|&(signal, position)| Rates {
+        background: BACKGROUND,
+        signal,
+        position,
+        sigma: SIGMA,
+    });
+    let rates: Vec<Rates> = rates.collect();
     let settings = setting.settings(setting.z())?;
     let mut array = SimulatedArray::new(ARRAY, &rates, &settings)?;
     let mut reports = Reports::new(ARRAY);
@@ -120,9 +118,8 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             } else {
                 ""
             };
-            *tally
-                .entry(format!("{who}{verdict} {}", event.level))
-                .or_default() += 1;
+            let name = format!("{who}{verdict} {}", event.level);
+            add_count(&mut tally, &name, 1);
         }
     }
     tally.insert("runs".to_owned(), 1);
@@ -138,31 +135,19 @@ fn wrong(point: &PointTally) -> Measured {
 fn results(part: &Part) -> Result<Results> {
     let mut csv = format!("scene,levels,patience,{VERDICT_HEAD},object right 0\n");
     for point in part.points() {
-        writeln!(
-            csv,
-            "{},{},{},{},{}",
-            SCENES[usize::from(whole(&point.parameters, "scene"))],
-            point.parameter("levels"),
-            point.parameter("patience"),
-            verdict_cells(point),
-            point.count("object right 0")
-        )?;
+        let scene = SCENES[usize::from(whole(&point.parameters, "scene"))];
+        let at = point.parameter_cells(["levels", "patience"]);
+        let (reports, objects) = (verdict_cells(point), point.count("object right 0"));
+        writeln!(csv, "{scene},{at},{reports},{objects}")?;
     }
-    let mut panels = Vec::new();
-    for (number, name) in SCENES.iter().enumerate().take(OBJECTS) {
-        let mut series = Vec::new();
-        for (&levels, pen) in LEVELS[1..].iter().zip(PENS) {
+    let panels = SCENES.iter().enumerate().take(OBJECTS);
+    let panels = panels.map(|(number, name)| {
+        let series = LEVELS[1..].iter().zip(PENS).map(|(&levels, pen)| {
             let at = [("scene", number as f64), ("levels", levels)];
-            let dots = part
-                .at(at)
-                .map(|point| wrong(point).at(point.parameter("patience")));
-            series.push(Series::unnamed(pen, Style::JoinedDots, dots.collect()));
-        }
-        panels.push(Panel {
-            title: (*name).to_owned(),
-            series,
+            joined(pen, part.dots(at, "patience", wrong))
         });
-    }
+        panel(*name, series)
+    });
     let at = |scene: usize, levels| {
         part.one([
             ("scene", scene as f64),
@@ -170,25 +155,22 @@ fn results(part: &Part) -> Result<Results> {
             ("patience", PATIENCES[1]),
         ])
     };
-    let most = |levels| -> Result<f64> {
-        let mut most = 0.0f64;
-        for scene in 0..OBJECTS - 1 {
-            most = most.max(wrong(at(scene, levels)?).value);
-        }
-        Ok(most)
+    let most = |levels| {
+        let shares = (0..OBJECTS - 1).map(|scene| wrong(at(scene, levels)).value);
+        shares.fold(0.0, f64::max)
     };
-    let alone = part.one([("scene", OBJECTS as f64), ("levels", 0.0)])?;
-    let seen = |levels| -> Result<f64> {
-        let with = at(OBJECTS, levels)?.count("object right 0");
-        Ok(with as f64 / alone.count("object right 0") as f64)
+    let alone = part.one([("scene", OBJECTS as f64), ("levels", 0.0)]);
+    let seen = |levels| {
+        let with = at(OBJECTS, levels).count("object right 0");
+        with as f64 / alone.count("object right 0") as f64
     };
     let percent = |share: f64| format!("{:.1}", 100.0 * share);
     let chart = Chart {
         finding: format!(
             "Of what two levels of blocks report at edges and on slants up to {} % is wrong, of \
              three levels {} %",
-            percent(most(2.0)?),
-            percent(most(3.0)?)
+            percent(most(2.0)),
+            percent(most(3.0))
         ),
         holds: true,
         note:
@@ -200,19 +182,19 @@ fn results(part: &Part) -> Result<Results> {
         key: LEVELS[1..]
             .iter()
             .zip(PENS)
-            .map(|(levels, pen)| Key::new(pen, Style::JoinedDots, format!("up to level {levels}")))
+            .map(|(levels, pen)| joined_key(pen, format!("up to level {levels}")))
             .collect(),
         columns: 3,
-        panels,
+        panels: panels.collect(),
     };
     Ok(Results {
         figures: vec![Figure::new("binning-edges", &chart)?],
         values: [
-            ("two", percent(most(2.0)?)),
-            ("three", percent(most(3.0)?)),
-            ("objects one", format!("{:.0}", 100.0 * seen(1.0)?)),
-            ("objects two", format!("{:.0}", 100.0 * seen(2.0)?)),
-            ("objects three", format!("{:.0}", 100.0 * seen(3.0)?)),
+            ("two", percent(most(2.0))),
+            ("three", percent(most(3.0))),
+            ("objects one", format!("{:.0}", 100.0 * seen(1.0))),
+            ("objects two", format!("{:.0}", 100.0 * seen(2.0))),
+            ("objects three", format!("{:.0}", 100.0 * seen(3.0))),
         ]
         .into(),
         tables: vec![("results/data/binning_edges.csv", csv)],

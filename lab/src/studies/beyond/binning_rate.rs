@@ -2,13 +2,15 @@
 
 use super::setting::{L2, LEVELS, ONE_IN, Setting, by_level, levels_name, with_one_patience_alone};
 use super::simulated_array::SimulatedArray;
-use crate::sweep::mean::Measured;
+use crate::sweep::charts::{joined, joined_key, level, level_key, panel};
+use crate::sweep::mean::{Measured, add, add_count};
 use crate::sweep::results::{Figure, Results, ends};
-use crate::sweep::{Part, Point, Study, Tally, grid};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::Result;
 use dtof_core::Array;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
-use dtof_draw::palette::{Pen, REFERENCE, STEPS};
+use dtof_data::options::rows::grouped;
+use dtof_draw::chart::{Axis, Chart};
+use dtof_draw::palette::{Pen, STEPS};
 use dtof_light::rates::Rates;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
@@ -60,13 +62,18 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             for pixel in ARRAY.pixels_of(event.pixel, event.level) {
                 covered[usize::from(pixel.raw())] = true;
             }
-            *tally.entry(format!("reports {}", event.level)).or_default() += 1;
+            add(&mut tally, "reports", &event.level.to_string(), 1);
         }
         let covered = covered.iter().filter(|&&covered| covered).count() as u64;
-        *tally.entry("covered".to_owned()).or_default() += covered;
-        *tally.entry("windows".to_owned()).or_default() += u64::from(ARRAY.pixels());
+        add_count(&mut tally, "covered", covered);
+        add_count(&mut tally, "windows", ARRAY.pixels().into());
     }
     Ok(tally)
+}
+
+/// The share of pixels that a false report covers.
+fn covered(point: &PointTally) -> Measured {
+    point.share("covered", "windows")
 }
 
 fn results(part: &Part) -> Result<Results> {
@@ -79,52 +86,42 @@ fn results(part: &Part) -> Result<Results> {
     let mut fewest = u64::MAX;
     for tracking in [0.0, 1.0] {
         for levels in LEVELS {
-            let at = [("tracking", tracking), ("levels", levels)];
-            let line = [BACKGROUNDS[0], BACKGROUNDS[2]].map(|x| Dot::exact(x, requested));
-            let mut series = vec![Series::unnamed(REFERENCE, Style::Dashed, line.into())];
+            let mut series = vec![level(&BACKGROUNDS, requested)];
             for (patience, pen) in PATIENCES.into_iter().zip(PENS) {
-                let mut dots = Vec::new();
-                for point in part
-                    .at(at)
-                    .filter(|point| point.parameter("patience") == patience)
-                {
-                    let covered: Measured = point.share("covered", "windows");
+                let at = [
+                    ("tracking", tracking),
+                    ("levels", levels),
+                    ("patience", patience),
+                ];
+                for point in part.at(at) {
+                    let covered = covered(point);
                     let reports = by_level(point, "reports");
                     fewest = fewest.min(reports.iter().sum());
                     shares.push(covered.value / requested);
                     let background = point.parameter("background");
-                    dots.push(covered.at(background));
-                    let [a, b, c, d] = reports;
+                    let covered = covered.cells(5);
+                    let reports = reports.map(|count| count.to_string()).join(",");
                     writeln!(
                         csv,
-                        "{tracking},{levels},{patience},{background},{},{a},{b},{c},{d}",
-                        covered.cells(5)
+                        "{tracking},{levels},{patience},{background},{covered},{reports}"
                     )?;
                 }
-                if !dots.is_empty() {
-                    series.push(Series::unnamed(pen, Style::JoinedDots, dots));
+                let curve = joined(pen, part.dots(at, "background", covered));
+                if !curve.points.is_empty() {
+                    series.push(curve);
                 }
             }
             let with = if tracking > 0.0 { ", tracking" } else { "" };
-            panels.push(Panel {
-                title: levels_name(levels) + with,
-                series,
-            });
+            panels.push(panel(levels_name(levels) + with, series));
         }
     }
     let (least, most) = ends(shares);
-    let mut key = vec![Key::new(
-        REFERENCE,
-        Style::Dashed,
-        "1 %, as asked for".to_owned(),
-    )];
-    for (patience, pen) in PATIENCES.into_iter().zip(PENS) {
-        key.push(Key::new(
-            pen,
-            Style::JoinedDots,
-            format!("patience {patience}"),
-        ));
-    }
+    let patiences = PATIENCES.into_iter().zip(PENS);
+    let patiences =
+        patiences.map(|(patience, pen)| joined_key(pen, format!("patience {patience}")));
+    let key = [level_key("1 %, as asked for")]
+        .into_iter()
+        .chain(patiences);
     let chart = Chart {
         finding: format!(
             "Pixels and blocks have {least:.2} to {most:.2} times the false alarms asked for"
@@ -138,7 +135,7 @@ fn results(part: &Part) -> Result<Results> {
         y: Axis::linear("pixels covered, %")
             .percent()
             .within(0.0, 0.02),
-        key,
+        key: key.collect(),
         columns: 4,
         panels,
     };
@@ -147,7 +144,7 @@ fn results(part: &Part) -> Result<Results> {
         values: [
             ("least", format!("{least:.2}")),
             ("most", format!("{most:.2}")),
-            ("fewest", dtof_data::options::rows::grouped(fewest)),
+            ("fewest", grouped(fewest)),
         ]
         .into(),
         tables: vec![("results/data/binning_rate.csv", csv)],

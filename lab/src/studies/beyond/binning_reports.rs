@@ -5,12 +5,13 @@ use super::setting::{
     with_one_patience_alone,
 };
 use super::simulated_array::{Reports, SimulatedArray, verdict};
-use crate::sweep::mean::{Measured, Z_99};
+use crate::sweep::charts::{joined, joined_key, panel};
+use crate::sweep::mean::{Measured, Z_99, add, add_count};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use dtof_core::Array;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Panel, Point as Dot};
 use dtof_draw::palette::{Pen, STEPS};
 use dtof_light::rates::Rates;
 use rand_distr::{Distribution, Uniform};
@@ -77,46 +78,38 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     array.run(CYCLES, rng, |event| events.push(*event))?;
     let mut reports = Reports::new(ARRAY);
     let mut tally = Tally::new();
-    let mut add = |what: &str, number: u64| *tally.entry(what.to_owned()).or_default() += number;
     for event in &events {
         let covered = reports.take(event).len() as u64;
-        add(
-            &format!("{} {}", verdict(event, position), event.level),
-            covered,
-        );
+        let level = event.level.to_string();
+        add(&mut tally, verdict(event, position), &level, covered);
     }
-    add("cycles", CYCLES * u64::from(ARRAY.pixels()));
+    add_count(&mut tally, "cycles", CYCLES * u64::from(ARRAY.pixels()));
     Ok(tally)
-}
-
-/// Whether its pixels lend.
-fn is_lent(point: &PointTally) -> bool {
-    point.parameters.contains_key("lend")
 }
 
 /// Right events of pixels that share with two levels, or that lend, relative to pixels without
 /// blocks.
-fn kept(part: &Part, is_lent: bool, patience: f64, signal: f64) -> Result<Measured> {
+fn kept(part: &Part, is_lent: bool, patience: f64, signal: f64) -> Measured {
     let own = |point: &PointTally| point.count("right 0") as f64;
     let alone = part.one([
         ("levels", 0.0),
         ("patience", PATIENCES[0]),
         ("signal", signal),
-    ])?;
+    ]);
     let at = [("patience", patience), ("signal", signal)];
     let of = if is_lent {
-        part.at(at).find(|point| self::is_lent(point))
+        part.one([("lend", 1.0), at[0], at[1]])
     } else {
-        part.at(at).find(|point| point.parameter("levels") == 2.0)
+        part.one([("levels", 2.0), at[0], at[1]])
     };
-    let (of, alone) = (own(of.context("no such point")?), own(alone).max(1.0));
+    let (of, alone) = (own(of), own(alone).max(1.0));
     // Treats both counts as Poisson.
     let half = Z_99 * (1.0 / of.max(1.0) + 1.0 / alone).sqrt();
     let value = of / alone;
-    Ok(Measured {
+    Measured {
         value,
         interval: ((value * (1.0 - half)).max(0.0), value * (1.0 + half)),
-    })
+    }
 }
 
 /// Pixels that lend compared with pixels that share.
@@ -126,27 +119,23 @@ fn lending(part: &Part) -> Result<(Figure, [String; 4])> {
         (true, PATIENCES[2], STEPS[3], "lend, patience 250"),
         (true, PATIENCES[1], STEPS[6], "lend, patience 64"),
     ];
-    let mut series = Vec::new();
-    for (is_lent, patience, pen, _) in ways {
-        let mut dots = Vec::new();
-        for signal in SIGNALS {
-            dots.push(kept(part, is_lent, patience, signal)?.at(signal));
-        }
-        series.push(Series::unnamed(pen, Style::JoinedDots, dots));
-    }
-    let value = |way: usize, signal| -> Result<f64> {
+    let series = ways.map(|(is_lent, patience, pen, _)| {
+        let kept = |signal| kept(part, is_lent, patience, signal).at(signal);
+        joined(pen, SIGNALS.map(kept))
+    });
+    let value = |way: usize, signal| {
         let (is_lent, patience, ..) = ways[way];
-        Ok(kept(part, is_lent, patience, signal)?.value)
+        kept(part, is_lent, patience, signal).value
     };
-    let of = |way, signal| -> Result<String> { Ok(format!("{:.0}", 100.0 * value(way, signal)?)) };
-    let percentages = [of(0, 0.145)?, of(2, 0.145)?, of(1, 0.145)?, of(2, 0.05)?];
+    let percentages = [(0, 0.145), (2, 0.145), (1, 0.145), (2, 0.05)]
+        .map(|(way, signal)| format!("{:.0}", 100.0 * value(way, signal)));
     let chart = Chart {
         finding: format!(
             "With a patience of 64 pixels that share keep {} % of their own events, pixels that lend \
              {} % (0.145 signal photons a laser cycle)",
             percentages[0], percentages[1]
         ),
-        holds: value(0, 0.145)? > 2.0 * value(2, 0.145)?,
+        holds: value(0, 0.145) > 2.0 * value(2, 0.145),
         note: format!(
             "Right events over those of pixels alone, whose exposures last up to {L2} laser cycles. A pixel that \
              lends starts anew after the patience. Bars hold 99 %."
@@ -155,66 +144,46 @@ fn lending(part: &Part) -> Result<(Figure, [String; 4])> {
         y: Axis::linear("own events kept, %")
             .percent()
             .within(0.0, 1.1),
-        key: ways
-            .map(|(.., pen, name)| Key::new(pen, Style::JoinedDots, name))
-            .into(),
+        key: ways.map(|(.., pen, name)| joined_key(pen, name)).into(),
         columns: 1,
-        panels: vec![Panel::only(series)],
+        panels: vec![Panel::only(series.into())],
     };
     Ok((Figure::new("binning-lend", &chart)?, percentages))
 }
 
 /// Laser cycles between right reports of a pixel: its own reports, and all.
-fn between(part: &Part, levels: f64, patience: f64, signal: f64) -> Result<[f64; 2]> {
+fn between(part: &Part, levels: f64, patience: f64, signal: f64) -> [f64; 2] {
     let patience = if levels > 0.0 { patience } else { PATIENCES[0] };
-    let at = [
+    let point = part.one([
         ("levels", levels),
         ("patience", patience),
         ("signal", signal),
-    ];
-    let point = part.one(at)?;
+    ]);
     let right = by_level(point, "right");
     let cycles = point.count("cycles") as f64;
-    Ok([right[0], right.iter().sum()].map(|reports| cycles / reports as f64))
+    [right[0], right.iter().sum()].map(|reports| cycles / reports as f64)
 }
 
 fn results(part: &Part) -> Result<Results> {
     let mut csv = format!("patience,levels,signal,cycles,{VERDICT_HEAD},lend\n");
     for point in part.points() {
-        writeln!(
-            csv,
-            "{},{},{},{},{},{}",
-            point.parameter("patience"),
-            point.parameter("levels"),
-            point.parameter("signal"),
-            point.count("cycles"),
-            verdict_cells(point),
-            u8::from(is_lent(point))
-        )?;
+        let at = point.parameter_cells(["patience", "levels", "signal"]);
+        let (cycles, reports) = (point.count("cycles"), verdict_cells(point));
+        let is_lent = u8::from(point.parameters.contains_key("lend"));
+        writeln!(csv, "{at},{cycles},{reports},{is_lent}")?;
     }
-    let mut panels = Vec::new();
-    for patience in PATIENCES {
-        let mut series = Vec::new();
-        for (levels, pen) in LEVELS.into_iter().zip(PENS) {
-            let mut dots = Vec::new();
-            for signal in SIGNALS {
-                let [_, all] = between(part, levels, patience, signal)?;
-                if all.is_finite() {
-                    dots.push(Dot::exact(signal, all));
-                }
-            }
-            series.push(Series::unnamed(pen, Style::JoinedDots, dots));
-        }
-        panels.push(Panel {
-            title: format!("patience {patience}"),
-            series,
+    let panels = PATIENCES.map(|patience| {
+        let series = LEVELS.into_iter().zip(PENS).map(|(levels, pen)| {
+            let all = |signal| between(part, levels, patience, signal)[1];
+            let dots = Dot::curve(SIGNALS, all).into_iter();
+            joined(pen, dots.filter(|dot| dot.y.is_finite()))
         });
-    }
-    let default = PATIENCES[1];
-    let of = |levels, signal| between(part, levels, default, signal);
-    let dim = [of(0.0, 0.05)?[1], of(2.0, 0.05)?[1], of(3.0, 0.05)?[1]];
-    let bright = [of(0.0, 0.145)?[1], of(2.0, 0.145)?[1], of(3.0, 0.145)?[1]];
-    let kept = of(3.0, 0.145)?[0];
+        panel(format!("patience {patience}"), series)
+    });
+    let of = |levels, signal| between(part, levels, PATIENCES[1], signal);
+    let [dim, bright] =
+        [0.05, 0.145].map(|signal| [0.0, 2.0, 3.0].map(|levels| of(levels, signal)[1]));
+    let kept = of(3.0, 0.145)[0];
     let chart = Chart {
         finding: format!(
             "A pixel of 0.05 signal photons a cycle is reported each {:.0} laser cycles with two \
@@ -234,10 +203,10 @@ fn results(part: &Part) -> Result<Results> {
         key: LEVELS
             .into_iter()
             .zip(PENS)
-            .map(|(levels, pen)| Key::new(pen, Style::JoinedDots, levels_name(levels)))
+            .map(|(levels, pen)| joined_key(pen, levels_name(levels)))
             .collect(),
         columns: 3,
-        panels,
+        panels: panels.into(),
     };
     let whole = |value: f64| format!("{value:.0}");
     let (lending, [shared, lent, lent_later, lent_dim]) = lending(part)?;

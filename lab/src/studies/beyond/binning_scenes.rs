@@ -1,16 +1,18 @@
 //! Reports of blocks in scenes from files: the share of wrong ones, and the events that pixels
 //! lose.
 
-use super::setting::{BINS, LEVELS, Setting, VERDICT_HEAD, levels_name};
+use super::scene_file::{DEMO, DIM_TILTED_WALL, FAN, RADIAL, SceneFile, TILTED_WALL};
+use super::setting::{LEVELS, Setting, VERDICT_HEAD, levels_name};
 use super::simulated_array::{Reports, is_right};
+use crate::sweep::charts::{joined, joined_key, panel};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
-use anyhow::{Context, Result, ensure};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, numbers, whole};
+use anyhow::{Context, Result};
 use dtof_core::DepthEvent;
 use dtof_data::options::rows::grouped;
 use dtof_data::photons::source::PhotonSource;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
+use dtof_draw::chart::{Axis, Chart};
 use dtof_draw::palette::{EVENTS, PAPER};
 use dtof_engine::host::host_engine;
 use dtof_light::scene::{Scene, Shape};
@@ -19,52 +21,19 @@ use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 
-/// A file of `scenes/`, a factor for its light, and the laser cycles of a trial.
-struct File {
-    name: &'static str,
-    text: &'static str,
-    light: f64,
-    cycles: u64,
-}
-
-/// By number. The tilted wall is too bright for many reports of blocks, so there is a dim one as
-/// well.
-const SCENES: [File; 5] = [
-    File {
-        name: "fan",
-        text: include_str!("../../../../scenes/fan.toml"),
-        light: 1.0,
-        cycles: 20_000,
-    },
-    File {
-        name: "radial",
-        text: include_str!("../../../../scenes/radial.toml"),
-        light: 1.0,
-        cycles: 40_000,
-    },
-    File {
-        name: "tilted-wall",
-        text: include_str!("../../../../scenes/tilted-wall.toml"),
-        light: 1.0,
-        cycles: 5000,
-    },
-    File {
-        name: "dim tilted-wall",
-        text: include_str!("../../../../scenes/tilted-wall.toml"),
-        light: 0.1,
-        cycles: 5000,
-    },
-    File {
-        name: "demo",
-        text: include_str!("../../../../host/light/src/demo.toml"),
-        light: 1.0,
-        cycles: 4000,
-    },
+/// By number, with the laser cycles of a trial. The tilted wall is too bright for many reports of
+/// blocks, so there is a dim one as well.
+const SCENES: [(SceneFile, u64); 5] = [
+    (FAN, 20_000),
+    (RADIAL, 40_000),
+    (TILTED_WALL, 5000),
+    (DIM_TILTED_WALL, 5000),
+    (DEMO, 4000),
 ];
 /// The tilted wall of the file, and the scenes of the title.
 const BRIGHT: usize = 2;
 const SLANT: usize = 3;
-const DEMO: usize = 4;
+const OF_DEMO: usize = 4;
 /// Blocks with fewer reports are not drawn: their share is uncertain.
 const MIN_REPORTS: u64 = 1000;
 /// The longest exposure, and the default patience.
@@ -87,21 +56,15 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let scenes: Vec<f64> = (0u8..).take(SCENES.len()).map(f64::from).collect();
     // All levels of a scene have the same photons, and so the same trial.
-    grid([("scene", &scenes)])
+    grid([("scene", &numbers(SCENES.len()))])
 }
 
-/// The scene of the file, moved away by a random part of a bin. The centre of a fan is random, too.
-fn scene(file: &File, rng: &mut Pcg64) -> Result<Scene> {
+/// The scene of the file at a random distance. The centre of a fan is random, too.
+fn scene(file: &SceneFile, rng: &mut Pcg64) -> Result<Scene> {
     let unit = Uniform::new(0.0, 1.0)?;
-    let mut scene = Scene::parse(file.text)?;
-    ensure!(usize::from(scene.bins) == BINS, "{} bins", scene.bins);
-    scene.signal_at_one_metre *= file.light;
-    let shift_mm = unit.sample(rng) * scene.mm_per_bin();
+    let mut scene = file.moved(rng)?;
     for surface in &mut scene.surfaces {
-        surface.range_mm += shift_mm;
-        surface.range_right_mm += shift_mm;
         if let Shape::Fan(fan) = &mut surface.shape {
             fan.centre = fan.centre.map(|place| place + unit.sample(rng) - 0.5);
         }
@@ -113,9 +76,9 @@ fn scene(file: &File, rng: &mut Pcg64) -> Result<Scene> {
 type Counts = [[u64; 4]; 2];
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    let file = &SCENES[usize::from(whole(point, "scene"))];
+    let (file, cycles) = &SCENES[usize::from(whole(point, "scene"))];
     let scene = scene(file, rng)?;
-    let mut photons = scene.photons(rng.next_u64(), file.cycles)?;
+    let mut photons = scene.photons(rng.next_u64(), *cycles)?;
     let (array, addresses) = (photons.array(), photons.addresses());
     let mut runs = Vec::new();
     for levels in LEVELS {
@@ -133,7 +96,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let mut views = views.into_iter().flatten();
         !views.any(|view| is_right(event, view.range_mm / scene.mm_per_bin()))
     };
-    for _ in 0..file.cycles / u64::from(SLICE) {
+    for _ in 0..cycles / u64::from(SLICE) {
         let slice = photons.next_slice(SLICE)?;
         for (engine, reports, counts) in &mut runs {
             for event in engine.run(&slice)? {
@@ -154,7 +117,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             }
         }
     }
-    let cycles = (file.cycles - BEFORE) * addresses.len() as u64;
+    let cycles = (cycles - BEFORE) * addresses.len() as u64;
     tally.insert("cycles".to_owned(), cycles);
     Ok(tally)
 }
@@ -202,7 +165,7 @@ fn results(part: &Part) -> Result<Results> {
     let mut table = String::new();
     let mut panels = Vec::new();
     let mut least_kept = f64::INFINITY;
-    for (file, point) in SCENES.iter().zip(part.points()) {
+    for ((file, _), point) in SCENES.iter().zip(part.points()) {
         let (mut own, mut of_blocks) = (Vec::new(), Vec::new());
         for levels in LEVELS {
             let outcome = SceneOutcome::new(point, levels);
@@ -212,12 +175,8 @@ fn results(part: &Part) -> Result<Results> {
                 of_blocks.push(wrong.at(levels));
             }
             least_kept = least_kept.min(outcome.kept);
-            let cells: Vec<String> = outcome
-                .counts
-                .iter()
-                .flatten()
-                .map(u64::to_string)
-                .collect();
+            let counts = outcome.counts.iter().flatten();
+            let cells: Vec<String> = counts.map(u64::to_string).collect();
             let cycles = point.count("cycles");
             writeln!(csv, "{},{levels},{cycles},{}", file.name, cells.join(","))?;
             writeln!(
@@ -237,26 +196,19 @@ fn results(part: &Part) -> Result<Results> {
             )?;
         }
         if !of_blocks.is_empty() {
-            panels.push(Panel {
-                title: file.name.to_owned(),
-                series: vec![
-                    Series::unnamed(EVENTS, Style::JoinedDots, own),
-                    Series::unnamed(PAPER, Style::JoinedDots, of_blocks),
-                ],
-            });
+            let series = [joined(EVENTS, own), joined(PAPER, of_blocks)];
+            panels.push(panel(file.name, series));
         }
     }
-    let wrong = |scene: usize, levels| -> Result<String> {
-        let point = part.points().get(scene).context("no such scene")?;
-        Ok(percent(SceneOutcome::new(point, levels).blocks_wrong.value))
-    };
-    let [slant, demo] = [wrong(SLANT, 2.0)?, wrong(DEMO, 2.0)?];
+    let of = |scene: usize, levels| SceneOutcome::new(&part.points()[scene], levels);
+    let wrong = |scene, levels| percent(of(scene, levels).blocks_wrong.value);
+    let [slant, demo] = [SLANT, OF_DEMO].map(|scene| wrong(scene, 2.0));
     let chart = Chart {
         finding: format!(
             "Of what two levels of blocks report {slant} % is wrong on a dim tilted wall, {demo} % in the demo's \
              scene; of three levels {} and {} %",
-            wrong(SLANT, 3.0)?,
-            wrong(DEMO, 3.0)?
+            wrong(SLANT, 3.0),
+            wrong(OF_DEMO, 3.0)
         ),
         holds: least_kept >= 0.95,
         note: format!(
@@ -266,17 +218,16 @@ fn results(part: &Part) -> Result<Results> {
         x: Axis::linear("levels of blocks").within(0.0, 3.0),
         y: Axis::linear("wrong, %").percent(),
         key: vec![
-            Key::new(EVENTS, Style::JoinedDots, "of a pixel's own events"),
-            Key::new(PAPER, Style::JoinedDots, "of reports by blocks"),
+            joined_key(EVENTS, "of a pixel's own events"),
+            joined_key(PAPER, "of reports by blocks"),
         ],
         columns: 3,
         panels,
     };
-    let bright = part.points().get(BRIGHT).context("no such scene")?;
-    let bright = SceneOutcome::new(bright, 2.0);
+    let bright = of(BRIGHT, 2.0);
     let [all, wrong] = [&bright.counts[..], &bright.counts[1..]]
         .map(|counts| counts.iter().flatten().sum::<u64>());
-    let cycles = SCENES.iter().map(|file| file.cycles - BEFORE).min();
+    let cycles = SCENES.iter().map(|(_, cycles)| cycles - BEFORE).min();
     Ok(Results {
         figures: vec![Figure::new("binning-scenes", &chart)?],
         values: [

@@ -2,10 +2,11 @@
 //! is not flat.
 
 use super::light::Light;
-use super::setting::{BINS, ONE_IN, SIGMA, X};
+use super::setting::{BINS, SIGMA, X, window_rule};
+use crate::sweep::charts::{joined, joined_key, panel};
 use crate::sweep::mean::{Measured, add, add_error};
 use crate::sweep::results::{Figure, Results};
-use crate::sweep::{Part, Point, Study, Tally, point};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, numbers, whole};
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::neighbours::NeighbourConfig;
@@ -13,9 +14,9 @@ use dtof_core::rule::DecisionInput;
 use dtof_core::{
     Array, ArrayConfig, BinIndex, BinPosition, Count, Count10, CounterWidth, DepthEstimator,
     DepthEvent, Flags, Histogram, Neighbours, Peak, PixelArray, PixelConfig, PixelData, PixelPlace,
-    RangeGate, WindowRule, z_for,
+    WindowRule,
 };
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
+use dtof_draw::chart::{Axis, Chart};
 use dtof_draw::palette::{EVENTS, PAPER, Pen};
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -65,22 +66,14 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let sizes = |shape| SIZES.map(|size| point([("shape", shape), ("size", size)]));
-    [0.0, 1.0, 2.0].into_iter().flat_map(sizes).collect()
+    grid([("shape", &numbers(SHAPES.len())), ("size", &SIZES)])
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let mut tally = Tally::new();
-    let (_, shape) = SHAPES
-        .iter()
-        .zip(0u8..)
-        .find(|(_, number)| f64::from(*number) == point["shape"])
-        .context("no such shape")?
-        .0;
-    let gate = RangeGate::<BINS>::full();
-    let rule = WindowRule::new(3, z_for(ONE_IN, &gate, X, X, L2), Count::saturating(5))?;
+    let (_, shape) = SHAPES[usize::from(whole(point, "shape"))];
     let array = Array::new(3, 3).context("no array")?;
-    let neighbours = NeighbourConfig::new(array, Neighbours::Eight, &rule);
+    let neighbours = NeighbourConfig::new(array, Neighbours::Eight, &window_rule(X, L2)?);
     let estimator = DepthEstimator::for_pulse(U8F8::from_num(SIGMA));
     let config = PixelConfig::with_rule(*neighbours.rule().own())
         .x(X)
@@ -188,49 +181,44 @@ fn results(part: &Part) -> Result<Results> {
         "shape,size,depth of,rms bins,rms_low,rms_high,mean bins,mean_low,mean_high,wrong,confirmed,by itself\n"
             .to_owned();
     let mut panels = Vec::new();
-    let rms = |shape: f64, size: f64, way: &str| -> Result<Measured> {
-        let point = part.one([("shape", shape), ("size", size)])?;
-        Ok(Measured::root_mean_square(point, way).times(1.0 / 256.0))
-    };
-    for ((name, _), shape) in SHAPES.iter().zip([0.0, 1.0, 2.0]) {
+    let rms =
+        |point: &PointTally, way: &str| Measured::root_mean_square(point, way).times(1.0 / 256.0);
+    for ((name, _), shape) in SHAPES.iter().zip(0u8..) {
         let mut series = Vec::new();
         for (way, pen) in WAYS {
-            let mut dots = Vec::new();
-            for size in SIZES {
-                let point = part.one([("shape", shape), ("size", size)])?;
-                let error = rms(shape, size, way)?;
+            let shape = [("shape", shape.into())];
+            for point in part.at(shape) {
                 let mean = Measured::mean(point, way).times(1.0 / 256.0);
                 let [wrong, values] =
                     ["wrong", "values"].map(|what| point.count(&format!("{way} {what}")));
                 writeln!(
                     csv,
-                    "\"{name}\",{size},{way},{},{},{wrong},{},{}",
-                    error.cells(3),
+                    "\"{name}\",{},{way},{},{},{wrong},{},{}",
+                    point.parameter("size"),
+                    rms(point, way).cells(3),
                     mean.cells(3),
                     wrong + values,
                     point.count("other events")
                 )?;
-                dots.push(error.at(size));
             }
-            series.push(Series::unnamed(pen, Style::JoinedDots, dots));
+            let dots = part.dots(shape, "size", |point| rms(point, way));
+            series.push(joined(pen, dots));
         }
-        panels.push(Panel {
-            title: (*name).to_owned(),
-            series,
-        });
+        panels.push(panel(*name, series));
     }
+    let at = |shape, size| part.one([("shape", shape), ("size", size)]);
+    let both = |shape, size| ["all", "own"].map(|way| rms(at(shape, size), way).interval);
     let better = |shape, size| {
-        let [all, own] = [rms(shape, size, "all")?, rms(shape, size, "own")?];
-        anyhow::Ok(all.interval.1 < own.interval.0)
+        let [all, own] = both(shape, size);
+        all.1 < own.0
     };
     let worse = |shape, size| {
-        let [all, own] = [rms(shape, size, "all")?, rms(shape, size, "own")?];
-        anyhow::Ok(own.interval.1 < all.interval.0)
+        let [all, own] = both(shape, size);
+        own.1 < all.0
     };
-    let holds = better(0.0, 0.0)? && better(0.0, 1.0)? && better(1.0, 1.0)? && worse(2.0, 2.0)?;
-    let island = part.one([("shape", 2.0), ("size", 1.5)])?;
-    let kept = 1.0 - Measured::mean(island, "all").value / 256.0 / 1.5;
-    let far = part.one([("shape", 2.0), ("size", 6.0)])?;
+    let holds = better(0.0, 0.0) && better(0.0, 1.0) && better(1.0, 1.0) && worse(2.0, 2.0);
+    let kept = 1.0 - Measured::mean(at(2.0, 1.5), "all").value / 256.0 / 1.5;
+    let far = at(2.0, 6.0);
     let [wrong, right, alone] =
         ["all wrong", "all values", "other events"].map(|name| far.count(name));
     let at_wall = Measured::share(wrong, wrong + right + alone);
@@ -243,13 +231,10 @@ fn results(part: &Part) -> Result<Results> {
         ),
         x: Axis::linear("size, bins"),
         y: Axis::linear("rms error, bins"),
-        key: [
-            ("all photons of the pixels", EVENTS),
-            ("the pixel's own photons", PAPER),
-        ]
-        .into_iter()
-        .map(|(name, pen)| Key::new(pen, Style::JoinedDots, name))
-        .collect(),
+        key: vec![
+            joined_key(EVENTS, "all photons of the pixels"),
+            joined_key(PAPER, "the pixel's own photons"),
+        ],
         columns: 2,
         panels,
     };

@@ -1,17 +1,18 @@
 //! Counters of 8 bits: the laser cycles to an event over the background, beside wider counters.
 
 use super::light::Light;
-use super::setting::{BINS, L1, ONE_IN, X};
+use super::setting::{BINS, L1, X, window_rule};
+use crate::sweep::charts::{joined, joined_key, level, level_key, panel};
 use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Figure, Results};
-use crate::sweep::{Part, Point, Study, Tally, point};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::Result;
 use dtof_core::{
-    AsyncPixel, Count, Count8, Count10, CounterWidth, LaserCycle, PixelAddress, PixelConfig,
-    RangeGate, Statistics, WindowRule, z_for,
+    AsyncPixel, Count8, Count10, CounterWidth, LaserCycle, PixelAddress, PixelConfig, Statistics,
+    WindowRule,
 };
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
-use dtof_draw::palette::{EVENTS, PAPER, Pen, REFERENCE};
+use dtof_draw::chart::{Axis, Chart, Key};
+use dtof_draw::palette::{EVENTS, PAPER, Pen};
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
@@ -44,10 +45,7 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let at = |signal| {
-        BACKGROUNDS.map(|background| point([("background", background), ("signal", signal)]))
-    };
-    SIGNALS.into_iter().flat_map(at).collect()
+    grid([("signal", &SIGNALS), ("background", &BACKGROUNDS)])
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
@@ -104,9 +102,7 @@ impl<W: CounterWidth> Run<W> {
 
 /// The same photons for both, until each has an event or time is over.
 fn run(light: &Light, rng: &mut Pcg64, tally: &mut Tally) -> Result<()> {
-    let gate = RangeGate::<BINS>::full();
-    let z = z_for(ONE_IN, &gate, X, L1, L2);
-    let config = PixelConfig::with_rule(WindowRule::new(3, z, Count::saturating(5))?)
+    let config = PixelConfig::with_rule(window_rule(L1, L2)?)
         .x(X)
         .l1(L1)
         .l2(L2)
@@ -124,56 +120,43 @@ fn run(light: &Light, rng: &mut Pcg64, tally: &mut Tally) -> Result<()> {
     Ok(())
 }
 
-fn measured(part: &Part, bits: &str, signal: f64, background: f64) -> Result<[Measured; 2]> {
-    let point = part.one([("background", background), ("signal", signal)])?;
+/// Laser cycles to the end of a run, and the share of runs that end with an event.
+fn measured(point: &PointTally, bits: &str) -> [Measured; 2] {
     let events = point.share(&format!("{bits} events"), &format!("{bits} values"));
-    Ok([Measured::mean(point, bits), events])
+    [Measured::mean(point, bits), events]
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let ends = [BACKGROUNDS[0], BACKGROUNDS[6]].map(|end| Dot::exact(end, MOST.into()));
-    let mut panels = Vec::new();
-    for signal in SIGNALS {
-        let mut series = vec![Series::unnamed(REFERENCE, Style::Dashed, ends.into())];
-        for (bits, _, pen) in WIDTHS {
-            let dot = |background| {
-                let [cycles, _] = measured(part, bits, signal, background)?;
-                anyhow::Ok(cycles.at(background))
-            };
-            let dots = BACKGROUNDS.into_iter().map(dot).collect::<Result<_>>()?;
-            series.push(Series::unnamed(pen, Style::JoinedDots, dots));
-        }
-        panels.push(Panel {
-            title: format!("{signal} signal photons"),
-            series,
-        });
-    }
-    let same = |signal, background| {
-        let [narrow, wide] = ["8", "10"].map(|bits| measured(part, bits, signal, background));
-        anyhow::Ok((narrow?[0].value - wide?[0].value).abs() < 1.0)
+    let panels = SIGNALS.map(|signal| {
+        let mut series = vec![level(&BACKGROUNDS, MOST.into())];
+        series.extend(WIDTHS.map(|(bits, _, pen)| {
+            let cycles = |point: &PointTally| measured(point, bits)[0];
+            joined(pen, part.dots([("signal", signal)], "background", cycles))
+        }));
+        panel(format!("{signal} signal photons"), series)
+    });
+    let both = |signal, background| {
+        let point = part.one([("background", background), ("signal", signal)]);
+        ["8", "10"].map(|bits| measured(point, bits)[0])
     };
-    let [narrow, wide] = ["8", "10"].map(|bits| measured(part, bits, 0.2, 0.5));
-    let fails = narrow?[0].interval.0 > wide?[0].interval.1;
-    let mut holds = fails;
-    for signal in SIGNALS {
-        for background in &BACKGROUNDS[..3] {
-            holds &= same(signal, *background)?;
-        }
-    }
-    let mut key: Vec<Key> = WIDTHS
-        .into_iter()
-        .map(|(bits, bytes, pen)| {
-            Key::new(
-                pen,
-                Style::JoinedDots,
-                format!("{bytes} bytes: {bits} bits"),
-            )
-        })
+    let is_same = |signal, background| {
+        let [narrow, wide] = both(signal, background);
+        (narrow.value - wide.value).abs() < 1.0
+    };
+    let [narrow, wide] = both(0.2, 0.5);
+    let fails = narrow.interval.0 > wide.interval.1;
+    let are_same = SIGNALS.into_iter().all(|signal| {
+        let dark = &BACKGROUNDS[..3];
+        dark.iter().all(|&background| is_same(signal, background))
+    });
+    let widths = WIDTHS.iter();
+    let mut key: Vec<Key> = widths
+        .map(|(bits, bytes, pen)| joined_key(*pen, format!("{bytes} bytes: {bits} bits")))
         .collect();
-    key.push(Key::new(REFERENCE, Style::Dashed, "no event until then"));
+    key.push(level_key("no event until then"));
     let chart = Chart {
         finding: "8 bits are as fast, unless a bright background fills them first".to_owned(),
-        holds,
+        holds: fails && are_same,
         note: format!(
             "Means of the laser cycles to the first event, right or wrong, or {MOST} without one. Bytes are of a macropixel of {BINS} \
              bins. Bars hold 99 %. L2 = {L2}."
@@ -182,7 +165,7 @@ fn results(part: &Part) -> Result<Results> {
         y: Axis::logarithmic("laser cycles to an event"),
         key,
         columns: 2,
-        panels,
+        panels: panels.into(),
     };
     Ok(Results {
         figures: vec![Figure::new("counters", &chart)?],
@@ -194,19 +177,16 @@ fn results(part: &Part) -> Result<Results> {
 
 fn csv(part: &Part) -> Result<String> {
     let mut csv = "signal,background,bits,bytes,cycles,cycles_low,cycles_high,events,events_low,events_high,ended_full\n".to_owned();
-    for signal in SIGNALS {
-        for background in BACKGROUNDS {
-            for (bits, bytes, _) in WIDTHS {
-                let [cycles, events] = measured(part, bits, signal, background)?;
-                let point = part.one([("background", background), ("signal", signal)])?;
-                writeln!(
-                    csv,
-                    "{signal},{background},{bits},{bytes},{},{},{}",
-                    cycles.cells(1),
-                    events.cells(4),
-                    point.count(&format!("{bits} full")),
-                )?;
-            }
+    for point in part.points() {
+        let [signal, background] = ["signal", "background"].map(|name| point.parameter(name));
+        for (bits, bytes, _) in WIDTHS {
+            let [cycles, events] = measured(point, bits);
+            let (cycles, events) = (cycles.cells(1), events.cells(4));
+            let full = point.count(&format!("{bits} full"));
+            writeln!(
+                csv,
+                "{signal},{background},{bits},{bytes},{cycles},{events},{full}"
+            )?;
         }
     }
     Ok(csv)

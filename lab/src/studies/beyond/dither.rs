@@ -4,14 +4,15 @@ use crate::studies::failures::case::{BACKGROUND, Case, SIGNAL};
 use crate::studies::failures::stray::StrayLight;
 use crate::studies::failures::{BINS, FALSE, Method, Rule};
 use crate::studies::scenes::one_pixel::in_parts;
+use crate::sweep::charts::{joined, joined_key, level, level_key, panel};
 use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, Study, Tally, point, whole};
 use anyhow::Result;
 use dtof_core::{LaserCycle, Look, OncePerBin, Statistics};
 use dtof_data::options::rows::grouped;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
-use dtof_draw::palette::{Pen, REFERENCE, STEPS};
+use dtof_draw::chart::{Axis, Chart, Panel};
+use dtof_draw::palette::{Pen, STEPS};
 use dtof_engine::settings::DITHER_BINS;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
@@ -170,11 +171,9 @@ fn points() -> Vec<Point> {
             ])
         };
         points.push(at(ABSENT, 0.0));
-        points.extend(
-            STRENGTHS
-                .into_iter()
-                .flat_map(|strength| RANGES.map(|range| at(strength, range))),
-        );
+        for strength in STRENGTHS {
+            points.extend(RANGES.map(|range| at(strength, range)));
+        }
     }
     points
 }
@@ -248,67 +247,51 @@ pub struct DitherOutcome {
 }
 
 /// The outcome next to a LiDAR of this strength, with a dither of this range.
-///
-/// # Errors
-/// Fails if `part` has no such point.
+#[must_use]
 pub fn outcome(
     part: &Part,
     scene: Scene,
     counted: Counted,
     strength: f64,
     range: f64,
-) -> Result<DitherOutcome> {
+) -> DitherOutcome {
     let point = part.one([
         ("scene", scene.number()),
         ("strength", strength),
         ("range", range),
-    ])?;
+    ]);
     let name = counted.name();
     let trials = if scene.has_target() {
         format!("{name} values")
     } else {
         "exposures".to_owned()
     };
-    Ok(DitherOutcome {
+    DitherOutcome {
         wrong: point.share(&format!("{name} wrong"), &trials),
         cycles: Measured::mean(point, name),
         exposures: point.count("exposures"),
-    })
+    }
 }
 
 /// The outcome without another LiDAR.
-///
-/// # Errors
-/// As [`outcome`].
-pub fn undisturbed(part: &Part, scene: Scene, counted: Counted) -> Result<DitherOutcome> {
+#[must_use]
+pub fn undisturbed(part: &Part, scene: Scene, counted: Counted) -> DitherOutcome {
     outcome(part, scene, counted, ABSENT, 0.0)
 }
 
 /// The smallest range with surely at most [`MOST_WRONG`] next to a target and at most [`MOST_FALSE`] in the scene
 /// `empty` without one: the intervals end there. `None` if no range is large enough.
-///
-/// # Errors
-/// As [`outcome`].
-pub fn least_range(
-    part: &Part,
-    empty: Scene,
-    counted: Counted,
-    strength: f64,
-) -> Result<Option<f64>> {
-    for range in RANGES {
-        let wrong = |scene| {
-            anyhow::Ok(
-                outcome(part, scene, counted, strength, range)?
-                    .wrong
-                    .interval
-                    .1,
-            )
-        };
-        if wrong(Scene::Target)? <= MOST_WRONG && wrong(empty)? <= MOST_FALSE {
-            return Ok(Some(range));
-        }
-    }
-    Ok(None)
+#[must_use]
+pub fn least_range(part: &Part, empty: Scene, counted: Counted, strength: f64) -> Option<f64> {
+    let most = |scene, range| {
+        outcome(part, scene, counted, strength, range)
+            .wrong
+            .interval
+            .1
+    };
+    let suffices =
+        |&range: &f64| most(Scene::Target, range) <= MOST_WRONG && most(empty, range) <= MOST_FALSE;
+    RANGES.into_iter().find(suffices)
 }
 
 /// Panels, row by row.
@@ -335,61 +318,82 @@ const TIMES: [(Scene, Counted, &str); 2] = [
 ];
 const PENS: [Pen; 4] = [STEPS[0], STEPS[1], STEPS[2], STEPS[3]];
 
-fn results(part: &Part) -> Result<Results> {
-    let mut panels = Vec::new();
-    for (scene, counted, title) in PANELS {
-        let ends = [0.0, 254.0].map(|range| Dot::exact(range, REQUESTED));
-        let mut series = vec![Series::unnamed(REFERENCE, Style::Dashed, ends.into())];
-        for (strength, pen) in STRENGTHS.into_iter().zip(PENS) {
-            let dot = |range| {
-                let outcome = outcome(part, scene, counted, strength, range)?;
-                anyhow::Ok(outcome.wrong.at(range))
-            };
-            let dots = RANGES.into_iter().map(dot).collect::<Result<_>>()?;
-            series.push(Series::unnamed(pen, Style::JoinedDots, dots));
-        }
-        panels.push(Panel {
-            title: title.to_owned(),
-            series,
-        });
+/// A panel: a curve for each strength, and a line to compare with.
+fn strengths(
+    part: &Part,
+    (scene, counted, title): (Scene, Counted, &str),
+    reference: f64,
+    of: fn(DitherOutcome) -> Measured,
+) -> Panel {
+    let mut series = vec![level(&[0.0, 254.0], reference)];
+    for (strength, pen) in STRENGTHS.into_iter().zip(PENS) {
+        let dot = |range| of(outcome(part, scene, counted, strength, range)).at(range);
+        series.push(joined(pen, RANGES.map(dot)));
     }
-    let as_bright = |scene| {
-        let outcome = outcome(part, scene, Counted::All, 1.0, DEFAULT)?;
-        anyhow::Ok(outcome.wrong.interval)
-    };
-    let mut key: Vec<Key> = STRENGTHS
-        .into_iter()
-        .zip(PENS)
-        .map(|(strength, pen)| Key::new(pen, Style::JoinedDots, format!("{strength} ×")))
-        .collect();
-    key.push(Key::new(REFERENCE, Style::Dashed, "1 %, as requested"));
-    let chart = Chart {
-        finding: format!("{DEFAULT} bins hide an equal LiDAR, not in the dark"),
-        holds: as_bright(Scene::Target)?.1 <= MOST_WRONG
-            && as_bright(Scene::Empty)?.1 <= MOST_FALSE
-            && as_bright(Scene::Dark)?.0 > MOST_FALSE,
+    panel(title, series)
+}
+
+/// A chart of such panels.
+fn chart(finding: String, holds: bool, y: Axis, reference: &str, panels: Vec<Panel>) -> Chart {
+    let strengths = STRENGTHS.into_iter().zip(PENS);
+    let strengths = strengths.map(|(strength, pen)| joined_key(pen, format!("{strength} ×")));
+    Chart {
+        finding,
+        holds,
         note: format!(
             "Key: photons of the other LiDAR's pulse over the target's {SIGNAL}. Its clock is 20 ppm off. Bars hold \
              99 %. Background {BACKGROUND} a bin and laser cycle; half of it for the first photon only."
         ),
         x: Axis::linear("range of the dither, bins"),
-        y: Axis::logarithmic("events or exposures, %")
-            .percent()
-            .within(2e-5, 1.0),
-        key,
+        y,
+        key: strengths.chain([level_key(reference)]).collect(),
         columns: 2,
         panels,
+    }
+}
+
+fn results(part: &Part) -> Result<Results> {
+    let wrong = |shown| strengths(part, shown, REQUESTED, |outcome| outcome.wrong);
+    let as_bright = |scene| {
+        let outcome = outcome(part, scene, Counted::All, 1.0, DEFAULT);
+        outcome.wrong.interval
     };
-    let exposures = |scene| {
-        anyhow::Ok(grouped(
-            undisturbed(part, scene, scene.counted()[0])?.exposures,
-        ))
+    let wrong = chart(
+        format!("{DEFAULT} bins hide an equal LiDAR, not in the dark"),
+        as_bright(Scene::Target).1 <= MOST_WRONG
+            && as_bright(Scene::Empty).1 <= MOST_FALSE
+            && as_bright(Scene::Dark).0 > MOST_FALSE,
+        Axis::logarithmic("events or exposures, %")
+            .percent()
+            .within(2e-5, 1.0),
+        "1 %, as requested",
+        PANELS.map(wrong).into(),
+    );
+    let alone = |scene, counted| undisturbed(part, scene, counted).cycles.value;
+    let cycles = |shown: (Scene, Counted, &str)| {
+        let alone = alone(shown.0, shown.1);
+        strengths(part, shown, alone, |outcome| outcome.cycles)
     };
+    let slower = |scene, counted| {
+        let cycles = outcome(part, scene, counted, 2.0, DEFAULT).cycles.value;
+        cycles / alone(scene, counted)
+    };
+    let times = chart(
+        "A TDC of the first photon loses more time".to_owned(),
+        slower(Scene::FirstPhoton, Counted::First) > slower(Scene::Target, Counted::All),
+        Axis::linear("laser cycles an event"),
+        "without the other",
+        TIMES.map(cycles).into(),
+    );
+    let exposures = |scene: Scene| grouped(undisturbed(part, scene, scene.counted()[0]).exposures);
     Ok(Results {
-        figures: vec![Figure::new("dither", &chart)?, times(part)?],
+        figures: vec![
+            Figure::new("dither", &wrong)?,
+            Figure::new("dither-time", &times)?,
+        ],
         values: [
-            ("exposures", exposures(Scene::Target)?),
-            ("empty exposures", exposures(Scene::Empty)?),
+            ("exposures", exposures(Scene::Target)),
+            ("empty exposures", exposures(Scene::Empty)),
         ]
         .into(),
         tables: vec![("results/data/dither.csv", csv(part)?)],
@@ -397,59 +401,14 @@ fn results(part: &Part) -> Result<Results> {
     })
 }
 
-/// The laser cycles to an event.
-fn times(part: &Part) -> Result<Figure> {
-    let mut panels = Vec::new();
-    for (scene, counted, title) in TIMES {
-        let alone = undisturbed(part, scene, counted)?.cycles.value;
-        let ends = [0.0, 254.0].map(|range| Dot::exact(range, alone));
-        let mut series = vec![Series::unnamed(REFERENCE, Style::Dashed, ends.into())];
-        for (strength, pen) in STRENGTHS.into_iter().zip(PENS) {
-            let dot = |range| {
-                let cycles = outcome(part, scene, counted, strength, range)?.cycles;
-                anyhow::Ok(cycles.at(range))
-            };
-            let dots = RANGES.into_iter().map(dot).collect::<Result<_>>()?;
-            series.push(Series::unnamed(pen, Style::JoinedDots, dots));
-        }
-        panels.push(Panel {
-            title: title.to_owned(),
-            series,
-        });
-    }
-    let slower = |scene, counted| {
-        let cycles = outcome(part, scene, counted, 2.0, DEFAULT)?.cycles.value;
-        anyhow::Ok(cycles / undisturbed(part, scene, counted)?.cycles.value)
-    };
-    let mut key: Vec<Key> = STRENGTHS
-        .into_iter()
-        .zip(PENS)
-        .map(|(strength, pen)| Key::new(pen, Style::JoinedDots, format!("{strength} ×")))
-        .collect();
-    key.push(Key::new(REFERENCE, Style::Dashed, "without the other"));
-    let chart = Chart {
-        finding: "A TDC of the first photon loses more time".to_owned(),
-        holds: slower(Scene::FirstPhoton, Counted::First)? > slower(Scene::Target, Counted::All)?,
-        note: format!(
-            "Key: photons of the other LiDAR's pulse over the target's {SIGNAL}. Its clock is 20 ppm off. Bars hold \
-             99 %. Background {BACKGROUND} a bin and laser cycle; half of it for the first photon only."
-        ),
-        x: Axis::linear("range of the dither, bins"),
-        y: Axis::linear("laser cycles an event"),
-        key,
-        columns: 2,
-        panels,
-    };
-    Figure::new("dither-time", &chart)
-}
-
 fn csv(part: &Part) -> Result<String> {
     let mut csv = "scene,counted,strength,range,exposures,wrong,wrong_low,wrong_high,cycles,cycles_low,cycles_high\n"
         .to_owned();
     for scene in Scene::ALL {
         for &counted in scene.counted() {
-            let mut row = |strength, range| {
-                let outcome = outcome(part, scene, counted, strength, range)?;
+            for point in part.at([("scene", scene.number())]) {
+                let [strength, range] = ["strength", "range"].map(|name| point.parameter(name));
+                let outcome = outcome(part, scene, counted, strength, range);
                 writeln!(
                     csv,
                     "\"{}\",{},{strength},{range},{},{},{}",
@@ -459,13 +418,6 @@ fn csv(part: &Part) -> Result<String> {
                     outcome.wrong.cells(5),
                     outcome.cycles.cells(2),
                 )?;
-                anyhow::Ok(())
-            };
-            row(ABSENT, 0.0)?;
-            for strength in STRENGTHS {
-                for range in RANGES {
-                    row(strength, range)?;
-                }
             }
         }
     }
@@ -512,7 +464,7 @@ mod tests {
             ..STUDY
         };
         let part = run_seeds(&study, 0..1).unwrap();
-        let least = |empty| least_range(&part, empty, Counted::All, 1.0).unwrap();
+        let least = |empty| least_range(&part, empty, Counted::All, 1.0);
         assert_eq!(least(Scene::Empty), Some(64.0));
         assert_eq!(least(Scene::Dark), None);
     }

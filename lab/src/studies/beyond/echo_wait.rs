@@ -1,17 +1,18 @@
 //! How long an exposure waits for a second echo: the echoes found, and the cost for the first.
 
 use super::light::Light;
-use super::setting::{BINS, L1, ONE_IN, SIGMA, X};
+use super::setting::{BINS, L1, SIGMA, X, window_rule};
+use crate::sweep::charts::{joined, joined_key, panel};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results, ends};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally, whole};
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AsyncPixel, Count, DepthEstimator, EchoNumber, LaserCycle, PixelAddress, PixelConfig,
-    RangeGate, Statistics, WindowRule, z_for,
+    AsyncPixel, DepthEstimator, EchoNumber, LaserCycle, PixelAddress, PixelConfig, Statistics,
+    WindowRule,
 };
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Point as Dot};
 use dtof_draw::palette::{Pen, REFERENCE, STEPS};
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -71,11 +72,10 @@ fn points() -> Vec<Point> {
 }
 
 fn config(wait: u16) -> Result<PixelConfig<BINS, WindowRule>> {
-    let z = z_for(ONE_IN, &RangeGate::<BINS>::full(), X, L1, L2);
     let two = EchoNumber::new(2).context("two")?;
     let estimator = DepthEstimator::for_pulse(U8F8::from_num(SIGMA));
-    let config = PixelConfig::with_rule(WindowRule::new(3, z, Count::saturating(5))?);
-    let config = config.x(X).l1(L1).l2(L2).estimator(estimator);
+    let config = PixelConfig::with_rule(window_rule(L1, L2)?).x(X);
+    let config = config.l1(L1).l2(L2).estimator(estimator);
     Ok(config
         .echoes(two, REACH)
         .echo_wait(wait.try_into()?)
@@ -84,15 +84,12 @@ fn config(wait: u16) -> Result<PixelConfig<BINS, WindowRule>> {
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let config = config(whole(point, "wait"))?;
-    let [near, far] = {
-        let near = 40.0 + Uniform::new(0.0, 1.0)?.sample(rng);
-        [near, near + DISTANCE]
-    };
+    let near = 40.0 + Uniform::new(0.0, 1.0)?.sample(rng);
     let cycles = f64::from(X);
     let first = point["first"] * cycles;
     let mut surfaces = vec![(first, near)];
     if point["ratio"] > NONE {
-        surfaces.push((first * point["ratio"], far));
+        surfaces.push((first * point["ratio"], near + DISTANCE));
     }
     let light = Light::new(point["background"] * cycles, &surfaces)?;
     let (mut pixel, mut statistics) = (
@@ -108,11 +105,8 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         pixel.end_laser_cycles(&config, &mut statistics, cycle, X);
         if let Some(event) = pixel.take_event() {
             let position = f64::from(event.position().raw()) / 256.0;
-            let places = surfaces.iter().map(|&(_, place)| place);
-            let of = places
-                .map(|place| (position - place).abs() <= NEAR)
-                .position(|is_near| is_near);
-            match of {
+            let is_near = |&(_, place): &(f64, f64)| (position - place).abs() <= NEAR;
+            match surfaces.iter().position(is_near) {
                 Some(surface) => seen[surface] = true,
                 None => wrong += 1,
             }
@@ -165,43 +159,38 @@ fn percent(share: f64) -> String {
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let panels = SCENES.map(|(first, background)| Panel {
-        title: format!("first {first}, background {background}"),
-        series: RATIOS
-            .map(|(ratio, _, pen)| {
-                let at = [
-                    ("first", first),
-                    ("background", background),
-                    ("ratio", ratio),
-                ];
-                let dots = part.at(at).map(|point| {
-                    let cycles = cycles_a_first(point);
-                    if ratio == NONE {
-                        Dot::exact(cycles, 0.0)
-                    } else {
-                        share(point).at(cycles)
-                    }
-                });
-                Series::unnamed(pen, Style::JoinedDots, dots.collect())
-            })
-            .into(),
+    let panels = SCENES.map(|(first, background)| {
+        let series = RATIOS.map(|(ratio, _, pen)| {
+            let at = [
+                ("first", first),
+                ("background", background),
+                ("ratio", ratio),
+            ];
+            let dots = part.at(at).map(|point| {
+                let cycles = cycles_a_first(point);
+                if ratio == NONE {
+                    Dot::exact(cycles, 0.0)
+                } else {
+                    share(point).at(cycles)
+                }
+            });
+            joined(pen, dots)
+        });
+        panel(format!("first {first}, background {background}"), series)
     });
     let half = found(part, 0.5, 4.0).0;
     // The rate of reports of a lone surface relative to a wait until L2.
-    let mut gains = Vec::new();
-    for (first, background) in SCENES {
-        let cycles = |wait| -> Result<f64> {
-            let point = part.one([
+    let gain = ends(SCENES.map(|(first, background)| {
+        let [longest, short] = [UNTIL_L2, 4.0].map(|wait| {
+            cycles_a_first(part.one([
                 ("first", first),
                 ("background", background),
                 ("ratio", NONE),
                 ("wait", wait),
-            ])?;
-            Ok(cycles_a_first(point))
-        };
-        gains.push(cycles(UNTIL_L2)? / cycles(4.0)?);
-    }
-    let gain = ends(gains);
+            ]))
+        });
+        longest / short
+    }));
     let (least, most) = (format!("{:.0}", gain.0), format!("{:.0}", gain.1));
     let chart = Chart {
         finding: format!(
@@ -219,9 +208,7 @@ fn results(part: &Part) -> Result<Results> {
         y: Axis::linear("exposures with both, %")
             .percent()
             .within(0.0, 1.08),
-        key: RATIOS
-            .map(|(_, name, pen)| Key::new(pen, Style::JoinedDots, name))
-            .into(),
+        key: RATIOS.map(|(_, name, pen)| joined_key(pen, name)).into(),
         columns: 2,
         panels: panels.into(),
     };
@@ -268,18 +255,10 @@ fn csv(part: &Part) -> Result<String> {
     let mut csv =
         "background,first,ratio,wait,cycles a first,both,low,high,wrong,exposures\n".to_owned();
     for point in part.points() {
-        writeln!(
-            csv,
-            "{},{},{},{},{:.1},{},{},{}",
-            point.parameter("background"),
-            point.parameter("first"),
-            point.parameter("ratio"),
-            point.parameter("wait"),
-            cycles_a_first(point),
-            share(point).cells(4),
-            point.count("wrong"),
-            point.count("exposures"),
-        )?;
+        let at = point.parameter_cells(["background", "first", "ratio", "wait"]);
+        let (cycles, both) = (cycles_a_first(point), share(point).cells(4));
+        let counts = point.count_cells(["wrong", "exposures"]);
+        writeln!(csv, "{at},{cycles:.1},{both},{counts}")?;
     }
     Ok(csv)
 }

@@ -1,16 +1,18 @@
 //! Several echoes of one exposure: two surfaces in one pixel, such as glass in front of a wall.
 
 use super::light::Light;
-use super::setting::{BINS, L1, L2, SIGMA, X};
+use super::setting::{BINS, L1, L2, SIGMA, X, window_rule};
+use crate::sweep::charts::{joined, joined_key, panel};
+use crate::sweep::mean::{Measured, add_count};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AsyncPixel, Count, DepthEstimator, EchoNumber, Histogram, LaserCycle, Look, PixelAddress,
-    PixelConfig, RangeGate, Statistics, WindowRule, z_for,
+    AsyncPixel, BinPosition, DepthEstimator, EchoNumber, Histogram, LaserCycle, Look, PixelAddress,
+    PixelConfig, Statistics, WindowRule,
 };
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
+use dtof_draw::chart::{Axis, Chart};
 use dtof_draw::palette::{Pen, STEPS};
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -23,9 +25,10 @@ const RATIOS: [f64; 4] = [1.0, 2.0, 4.0, 10.0];
 const PENS: [Pen; 4] = [STEPS[0], STEPS[2], STEPS[4], STEPS[6]];
 /// Signal photons of the dimmer echo in a whole histogram, and background photons a bin.
 const WHOLE_HISTOGRAM: (f64, f64) = (60.0, 1.0);
-/// For counting pixels: signal photons of the target a laser cycle, and background photons a bin.
+/// For counting pixels: signal photons of the target a laser cycle, and background photons a bin;
+/// 0 stands for the whole histogram.
 const TARGET: f64 = 0.1;
-const BACKGROUNDS: [f64; 2] = [0.01, 0.05];
+const BACKGROUNDS: [f64; 3] = [0.0, 0.01, 0.05];
 const REACH: u8 = 4;
 /// Exposures of a trial.
 const EXPOSURES: u64 = 50;
@@ -43,20 +46,20 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    // A background of 0 stands for the whole histogram.
     grid([
-        ("background", &[0.0, BACKGROUNDS[0], BACKGROUNDS[1]]),
+        ("background", &BACKGROUNDS),
         ("ratio", &RATIOS),
         ("distance", &DISTANCES),
     ])
 }
 
 fn config() -> Result<PixelConfig<BINS, WindowRule>> {
-    let gate = RangeGate::<BINS>::full();
-    let rule = WindowRule::new(3, z_for(100, &gate, X, L1, L2), Count::saturating(5))?;
     let two = EchoNumber::new(2).context("two")?;
     let estimator = DepthEstimator::for_pulse(U8F8::from_num(SIGMA));
-    let config = PixelConfig::with_rule(rule).x(X).l1(L1).l2(L2);
+    let config = PixelConfig::with_rule(window_rule(L1, L2)?)
+        .x(X)
+        .l1(L1)
+        .l2(L2);
     Ok(config.estimator(estimator).echoes(two, REACH).build()?)
 }
 
@@ -64,7 +67,6 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let config = config()?;
     let (background, ratio) = (point["background"], point["ratio"]);
     let mut tally = Tally::new();
-    let mut add = |what: &str| *tally.entry(what.to_owned()).or_default() += 1;
     for _ in 0..EXPOSURES {
         let near = 20.0 + Uniform::new(0.0, 1.0)?.sample(rng);
         let far = near + point["distance"];
@@ -97,72 +99,56 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
                 }
             }
         }
-        let is_at = |place: f64| {
-            let near = |position: &dtof_core::BinPosition| {
-                (f64::from(position.raw()) / 256.0 - place).abs() <= 3.0
-            };
-            found.iter().any(near)
+        let is_at = |position: &BinPosition, place: f64| {
+            (f64::from(position.raw()) / 256.0 - place).abs() <= 3.0
         };
-        let both = is_at(near) && is_at(far) && found.len() == 2;
-        add("exposures");
+        let is_found = |place| found.iter().any(|position| is_at(position, place));
+        let both = is_found(near) && is_found(far) && found.len() == 2;
+        let is_false = |position| !is_at(position, near) && !is_at(position, far);
+        add_count(&mut tally, "exposures", 1);
         if both {
-            add("both");
+            add_count(&mut tally, "both", 1);
         }
-        if found.iter().any(|position| {
-            let position = f64::from(position.raw()) / 256.0;
-            (position - near).abs() > 3.0 && (position - far).abs() > 3.0
-        }) {
-            add("false");
+        if found.iter().any(is_false) {
+            add_count(&mut tally, "false", 1);
         }
     }
     Ok(tally)
 }
 
+fn both(point: &PointTally) -> Measured {
+    point.share("both", "exposures")
+}
+
 fn results(part: &Part) -> Result<Results> {
     let mut csv = "background,ratio,distance,both,low,high,false,exposures\n".to_owned();
     for point in part.points() {
-        writeln!(
-            csv,
-            "{},{},{},{},{},{}",
-            point.parameter("background"),
-            point.parameter("ratio"),
-            point.parameter("distance"),
-            point.share("both", "exposures").cells(4),
-            point.count("false"),
-            point.count("exposures"),
-        )?;
+        let at = point.parameter_cells(["background", "ratio", "distance"]);
+        let counts = point.count_cells(["false", "exposures"]);
+        writeln!(csv, "{at},{},{counts}", both(point).cells(4))?;
     }
-    let mut panels = Vec::new();
-    for background in [0.0, BACKGROUNDS[0], BACKGROUNDS[1]] {
-        let mut series = Vec::new();
-        for (ratio, pen) in RATIOS.into_iter().zip(PENS) {
+    let panels = BACKGROUNDS.map(|background| {
+        let series = RATIOS.into_iter().zip(PENS).map(|(ratio, pen)| {
             let at = [("background", background), ("ratio", ratio)];
-            let dots = part.at(at).map(|point| {
-                point
-                    .share("both", "exposures")
-                    .at(point.parameter("distance"))
-            });
-            series.push(Series::unnamed(pen, Style::JoinedDots, dots.collect()));
-        }
-        panels.push(Panel {
-            title: if background == 0.0 {
-                "whole histogram".to_owned()
-            } else {
-                format!("counting, {background}")
-            },
-            series,
+            joined(pen, part.dots(at, "distance", both))
         });
-    }
+        let title = match background {
+            0.0 => "whole histogram".to_owned(),
+            _ => format!("counting, {background}"),
+        };
+        panel(title, series)
+    });
     let least = |background, ratio, from: f64| -> f64 {
-        let at = [("background", background), ("ratio", ratio)];
-        let points = part
-            .at(at)
-            .filter(|point| point.parameter("distance") >= from);
-        let share = |point: &PointTally| point.share("both", "exposures").value;
-        points.map(share).fold(1.0, f64::min)
+        let dots = part.dots(
+            [("background", background), ("ratio", ratio)],
+            "distance",
+            both,
+        );
+        let far = dots.iter().filter(|dot| dot.x >= from);
+        far.map(|dot| dot.y).fold(1.0, f64::min)
     };
     let equal = least(0.0, 1.0, 6.0);
-    let glass = least(BACKGROUNDS[0], 10.0, 12.0).min(least(BACKGROUNDS[1], 10.0, 12.0));
+    let glass = least(BACKGROUNDS[1], 10.0, 12.0).min(least(BACKGROUNDS[2], 10.0, 12.0));
     let percent = |share: f64| format!("{:.0}", (100.0 * share).floor());
     let chart = Chart {
         finding: format!(
@@ -184,10 +170,10 @@ fn results(part: &Part) -> Result<Results> {
         key: RATIOS
             .into_iter()
             .zip(PENS)
-            .map(|(ratio, pen)| Key::new(pen, Style::JoinedDots, format!("{ratio} : 1")))
+            .map(|(ratio, pen)| joined_key(pen, format!("{ratio} : 1")))
             .collect(),
         columns: 3,
-        panels,
+        panels: panels.into(),
     };
     Ok(Results {
         figures: vec![Figure::new("echoes", &chart)?],

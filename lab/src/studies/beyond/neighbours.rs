@@ -1,74 +1,36 @@
 //! Dim pixels of an array: by themselves, confirmed by neighbours, or together in blocks.
 
+use super::scene_file::{DEMO, DIM_TILTED_WALL, FAN, RADIAL, STATIC, SceneFile, TILTED_WALL};
 use super::setting::{BINS, ONE_IN, Setting, X};
 use super::simulated_array::is_right;
-use crate::sweep::mean::{Measured, add_error};
+use crate::sweep::charts::{joined, joined_key, panel};
+use crate::sweep::mean::{Measured, add, add_error};
 use crate::sweep::results::{Figure, Results};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, numbers, whole};
 use anyhow::{Context, Result, ensure};
 use dtof_core::binning::Block;
 use dtof_core::rule::z_for_levels;
 use dtof_core::{Neighbours, PixelPlace, RangeGate};
 use dtof_data::options::rows::significant;
 use dtof_data::photons::source::PhotonSource;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Point as Dot};
 use dtof_draw::palette::{Pen, STEPS};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_light::scene::Scene;
 use rand_core::Rng;
-use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 use std::mem::size_of;
 
-/// A file of `scenes/`, and a factor for its light.
-struct File {
-    name: &'static str,
-    text: &'static str,
-    light: f64,
-}
-
-const STATIC: &str = include_str!("../../../../scenes/static.toml");
-const TILTED: &str = include_str!("../../../../scenes/tilted-wall.toml");
-
 /// By number: all files with an array, and dim ones.
-const SCENES: [File; 7] = [
-    File {
-        name: "fan",
-        text: include_str!("../../../../scenes/fan.toml"),
-        light: 1.0,
-    },
-    File {
-        name: "radial",
-        text: include_str!("../../../../scenes/radial.toml"),
-        light: 1.0,
-    },
-    File {
-        name: "static",
-        text: STATIC,
-        light: 1.0,
-    },
-    File {
-        name: "tilted-wall",
-        text: TILTED,
-        light: 1.0,
-    },
-    File {
-        name: "demo",
-        text: include_str!("../../../../host/light/src/demo.toml"),
-        light: 1.0,
-    },
-    File {
-        name: "dim static",
-        text: STATIC,
-        light: 0.2,
-    },
-    File {
-        name: "dim tilted-wall",
-        text: TILTED,
-        light: 0.1,
-    },
+const SCENES: [SceneFile; 7] = [
+    FAN,
+    RADIAL,
+    STATIC,
+    TILTED_WALL,
+    DEMO,
+    STATIC.dimmed("dim static", 0.2),
+    DIM_TILTED_WALL,
 ];
 const DIM_WALL: usize = 6;
 
@@ -88,46 +50,43 @@ const PHOTON: &str = "array";
 const PHOTON_OF_BLOCKS: &str = "array with blocks; 2 levels";
 const LOOK: &str = "look; array; no event";
 
+const NEITHER: Way = Way {
+    name: "neither",
+    neighbours: None,
+    blocks: None,
+    pen: STEPS[6],
+    look: LOOK,
+    photon: PHOTON,
+};
+const WITH_BLOCKS: Way = Way {
+    name: "blocks",
+    blocks: Some((2, 64)),
+    pen: STEPS[5],
+    photon: PHOTON_OF_BLOCKS,
+    ..NEITHER
+};
 const WAYS: [Way; 5] = [
-    Way {
-        name: "neither",
-        neighbours: None,
-        blocks: None,
-        pen: STEPS[6],
-        look: LOOK,
-        photon: PHOTON,
-    },
+    NEITHER,
     Way {
         name: "4 neighbours",
         neighbours: Some(Neighbours::Four),
-        blocks: None,
         pen: STEPS[1],
         look: "",
-        photon: PHOTON,
+        ..NEITHER
     },
     Way {
         name: "8 neighbours",
         neighbours: Some(Neighbours::Eight),
-        blocks: None,
         pen: STEPS[2],
         look: "look; array, 8 neighbours; no event",
-        photon: PHOTON,
+        ..NEITHER
     },
-    Way {
-        name: "blocks",
-        neighbours: None,
-        blocks: Some((2, 64)),
-        pen: STEPS[5],
-        look: LOOK,
-        photon: PHOTON_OF_BLOCKS,
-    },
+    WITH_BLOCKS,
     Way {
         name: "blocks, patience 8",
-        neighbours: None,
         blocks: Some((2, 8)),
         pen: STEPS[0],
-        look: LOOK,
-        photon: PHOTON_OF_BLOCKS,
+        ..WITH_BLOCKS
     },
 ];
 const ALONE: usize = 0;
@@ -160,9 +119,8 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let scenes: Vec<f64> = (0u8..).take(SCENES.len()).map(f64::from).collect();
     // All ways decide on the same photons, so they are one trial.
-    grid([("scene", &scenes)])
+    grid([("scene", &numbers(SCENES.len()))])
 }
 
 impl Way {
@@ -187,10 +145,8 @@ impl Way {
         if levels == 0 {
             return pixel;
         }
-        let blocks: f64 = (1..=i32::from(levels))
-            .map(|level| 0.25f64.powi(level))
-            .sum();
-        pixel + blocks * size_of::<Block<BINS>>() as f64
+        let blocks = (1..=i32::from(levels)).map(|level| 0.25f64.powi(level));
+        pixel + blocks.sum::<f64>() * size_of::<Block<BINS>>() as f64
     }
 }
 
@@ -203,16 +159,7 @@ struct Run {
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    let file = &SCENES[usize::from(whole(point, "scene"))];
-    let mut scene = Scene::parse(file.text)?;
-    ensure!(usize::from(scene.bins) == BINS, "{} bins", scene.bins);
-    scene.signal_at_one_metre *= file.light;
-    // A random part of a bin farther away.
-    let shift_mm = Uniform::new(0.0, scene.mm_per_bin())?.sample(rng);
-    for surface in &mut scene.surfaces {
-        surface.range_mm += shift_mm;
-        surface.range_right_mm += shift_mm;
-    }
+    let scene = SCENES[usize::from(whole(point, "scene"))].moved(rng)?;
     let mut photons = scene.photons(rng.next_u64(), L2.into())?;
     let (array, addresses) = (photons.array(), photons.addresses());
     let runs = WAYS.iter().map(|way| {
@@ -254,12 +201,10 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     for (way, (_, run)) in WAYS.iter().zip(runs) {
         for first in run.first.into_iter().flatten() {
             let place = (OCTAVE * (first as f64).log2()).round();
-            *tally
-                .entry(format!("{} first {place}", way.name))
-                .or_default() += 1;
+            add(&mut tally, way.name, &format!("first {place}"), 1);
         }
-        tally.insert(format!("{} right", way.name), run.right);
-        tally.insert(format!("{} wrong", way.name), run.wrong);
+        add(&mut tally, way.name, "right", run.right);
+        add(&mut tally, way.name, "wrong", run.wrong);
     }
     tally.insert("pixels".to_owned(), addresses.len() as u64);
     Ok(tally)
@@ -314,7 +259,7 @@ fn results(part: &Part) -> Result<Results> {
     let mut table = String::new();
     let mut panels = Vec::new();
     for (file, point) in SCENES.iter().zip(part.points()) {
-        let mm = Scene::parse(file.text)?.mm_per_bin() / 256.0;
+        let mm = file.parse()?.mm_per_bin() / 256.0;
         let mut series = Vec::new();
         for way in &WAYS {
             let times = SHARES.map(|share| time(point, way, share));
@@ -341,23 +286,19 @@ fn results(part: &Part) -> Result<Results> {
             )?;
             let dots = SHARES.iter().zip(times);
             let dots = dots.filter_map(|(share, time)| Some(Dot::exact(time?, 100.0 * share)));
-            let dots: Vec<Dot> = dots.collect();
-            if !dots.is_empty() {
-                series.push(Series::unnamed(way.pen, Style::JoinedDots, dots));
+            let curve = joined(way.pen, dots);
+            if !curve.points.is_empty() {
+                series.push(curve);
             }
         }
-        panels.push(Panel {
-            title: file.name.to_owned(),
-            series,
-        });
+        panels.push(panel(file.name, series));
     }
-    let dim = part.points().get(DIM_WALL).context("no such scene")?;
+    let dim = &part.points()[DIM_WALL];
     let of = |way: usize, share| time(dim, &WAYS[way], share);
     let alone = of(ALONE, 0.9);
     let times = |way| {
-        alone
-            .zip(of(way, 0.9))
-            .map_or(0.0, |(alone, other)| alone / other)
+        let both = alone.zip(of(way, 0.9));
+        both.map_or(0.0, |(alone, other)| alone / other)
     };
     let [eight, blocks] = [EIGHT, BLOCKS].map(times);
     let chart = Chart {
@@ -372,7 +313,7 @@ fn results(part: &Part) -> Result<Results> {
         y: Axis::linear("pixels that are right, %").within(50.0, 100.0),
         key: WAYS
             .iter()
-            .map(|way| Key::new(way.pen, Style::JoinedDots, way.name))
+            .map(|way| joined_key(way.pen, way.name))
             .collect(),
         columns: 2,
         panels,

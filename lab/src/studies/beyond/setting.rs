@@ -5,7 +5,7 @@ use crate::sweep::{Point, PointTally, whole};
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::rule::z_for_levels;
-use dtof_core::{BlockLevel, Count, RangeGate, WindowRule};
+use dtof_core::{BlockLevel, Count, RangeGate, WindowRule, z_for};
 use dtof_engine::settings::{AdaptiveBinning, Settings};
 
 /// Bins of a histogram.
@@ -84,6 +84,12 @@ impl Setting {
             array.tracking = self.tracking;
         }))
     }
+}
+
+/// The window rule of these studies, at the same limit, for a pixel alone.
+pub fn window_rule(l1: u16, l2: u16) -> Result<WindowRule> {
+    let z = z_for(ONE_IN, &RangeGate::<BINS>::full(), X, l1, l2);
+    Ok(WindowRule::new(3, z, Count::saturating(5))?)
 }
 
 /// Removes points without blocks except those with `patience`: the patience has no effect without

@@ -2,13 +2,14 @@
 
 use super::setting::{L2, SIGMA, Setting};
 use super::simulated_array::{SimulatedArray, is_right, verdict};
-use crate::sweep::mean::{Measured, Z_99, add_value};
+use crate::sweep::charts::{joined, joined_key, level, panel};
+use crate::sweep::mean::{Measured, Z_99, add, add_count, add_value};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
 use anyhow::Result;
 use dtof_core::{Array, DepthEvent};
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
-use dtof_draw::palette::{EVENTS, PAPER, REFERENCE};
+use dtof_draw::chart::{Axis, Chart, Point as Dot};
+use dtof_draw::palette::{EVENTS, PAPER};
 use dtof_light::rates::Rates;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -80,12 +81,9 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         }
         // The position at the end of the exposure; the motion during it is ignored.
         let at = |event: &DepthEvent| start + DRIFT * event.cycle.raw() as f64 / 100.0;
-        for event in events
-            .iter()
-            .filter(|event| event.cycle.raw() >= u64::from(L2))
-        {
-            let verdict = verdict(event, at(event));
-            *tally.entry(verdict.to_owned()).or_default() += 1;
+        let settled = |event: &&DepthEvent| event.cycle.raw() >= u64::from(L2);
+        for event in events.iter().filter(settled) {
+            add_count(&mut tally, verdict(event, at(event)), 1);
         }
         tally.insert("cycles".to_owned(), (BEFORE + AFTER - u64::from(L2)) * 64);
         return Ok(tally);
@@ -118,7 +116,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
                 } else {
                     "elsewhere"
                 };
-                *tally.entry(format!("{who} {later}")).or_default() += 1;
+                add(&mut tally, who, &later.to_string(), 1);
             }
             STEADY => count(&mut tally, event, start),
             _ => {}
@@ -143,13 +141,11 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 
 /// Counts a right or wrong event, and its error.
 fn count(tally: &mut Tally, event: &DepthEvent, position: f64) {
+    add_count(tally, verdict(event, position), 1);
     if is_right(event, position) {
-        *tally.entry("right".to_owned()).or_default() += 1;
         #[allow(clippy::cast_possible_truncation, reason = "a few bins in 1/256")]
         let error = (f64::from(event.position().raw()) - 256.0 * position).round() as i64;
         add_value(tally, "error", error);
-    } else {
-        *tally.entry("wrong".to_owned()).or_default() += 1;
     }
 }
 
@@ -173,66 +169,32 @@ fn results(part: &Part) -> Result<Results> {
         ])
     };
     // Ratio with tracking to without.
-    let gain = |target, scene| -> Result<f64> {
-        let of = |tracking| -> Result<f64> {
-            let point = one(target, scene, tracking)?;
-            Ok(if target == JUMPS {
-                Measured::mean(point, "noticed").value
+    let gain = |target, scene| {
+        let [with, without] = [1.0, 0.0].map(|tracking| {
+            let point = one(target, scene, tracking);
+            let cycles = if target == JUMPS {
+                Measured::mean(point, "noticed")
             } else {
-                cycles_an_event(point).value
-            })
-        };
-        Ok(of(1.0)? / of(0.0)?)
+                cycles_an_event(point)
+            };
+            cycles.value
+        });
+        with / without
     };
-    let ghost = |scene, tracking, later: u64| -> Result<Measured> {
-        let point = one(VANISHES, scene, tracking)?;
-        Ok(point.share(&format!("ghost {later}"), "pixels"))
-    };
-    let mut csv = "target,background,signal,tracking,right,wrong,cycles,cycles to notice,ghost 0,ghost 1,ghost 2,pixels\n".to_owned();
-    for point in part.points() {
-        let noticed = if point.parameter("target") == f64::from(JUMPS) {
-            format!("{:.1}", Measured::mean(point, "noticed").value)
-        } else {
-            String::new()
-        };
-        writeln!(
-            csv,
-            "{},{},{},{},{},{},{},{noticed},{},{},{},{}",
-            point.parameter("target"),
-            point.parameter("background"),
-            point.parameter("signal"),
-            point.parameter("tracking"),
-            point.count("right"),
-            point.count("wrong"),
-            point.count("cycles"),
-            point.count("ghost 0"),
-            point.count("ghost 1"),
-            point.count("ghost 2"),
-            point.count("pixels"),
-        )?;
-    }
-    let mut panels = Vec::new();
-    for (target, title) in [
+    let panels = [
         (STEADY, "steady"),
         (DRIFTS, "drifting"),
         (JUMPS, "jump of 30 bins"),
-    ] {
-        let mut series = Vec::new();
-        let line = [SIGNALS[0], SIGNALS[2]].map(|x| Dot::exact(x, 1.0));
-        series.push(Series::unnamed(REFERENCE, Style::Dashed, line.into()));
+    ];
+    let panels = panels.map(|(target, title)| {
+        let mut series = vec![level(&SIGNALS, 1.0)];
         for (background, pen) in BACKGROUNDS.into_iter().zip([PAPER, EVENTS]) {
-            let mut dots = Vec::new();
-            for signal in SIGNALS {
-                dots.push(Dot::exact(signal, gain(target, (signal, background))?));
-            }
-            series.push(Series::unnamed(pen, Style::JoinedDots, dots));
+            let gain = |signal| gain(target, (signal, background));
+            series.push(joined(pen, Dot::curve(SIGNALS, gain)));
         }
-        panels.push(Panel {
-            title: title.to_owned(),
-            series,
-        });
-    }
-    let (steady, jump) = (gain(STEADY, HEADLINE)?, gain(JUMPS, HEADLINE)?);
+        panel(title, series)
+    });
+    let (steady, jump) = (gain(STEADY, HEADLINE), gain(JUMPS, HEADLINE));
     let chart = Chart {
         finding: format!(
             "A target that stays is reported in {steady:.2} times the laser cycles, one that jumps \
@@ -248,26 +210,46 @@ fn results(part: &Part) -> Result<Results> {
         y: Axis::linear("cycles an event, or to notice a jump, over those without")
             .within(0.0, 1.4),
         key: vec![
-            Key::new(PAPER, Style::JoinedDots, "background 0.01".to_owned()),
-            Key::new(EVENTS, Style::JoinedDots, "background 0.05".to_owned()),
+            joined_key(PAPER, "background 0.01"),
+            joined_key(EVENTS, "background 0.05"),
         ],
         columns: 3,
-        panels,
+        panels: panels.into(),
     };
-    let percent = |share: Measured| format!("{:.2}", 100.0 * share.value);
+    let ghost = |tracking, later: u64| {
+        let point = one(VANISHES, HEADLINE, tracking);
+        let share = point.share(&format!("ghost {later}"), "pixels");
+        format!("{:.2}", 100.0 * share.value)
+    };
     Ok(Results {
         figures: vec![Figure::new("tracking", &chart)?],
         values: [
             ("steady", format!("{steady:.2}")),
             ("jump", format!("{jump:.2}")),
-            ("drift", format!("{:.2}", gain(DRIFTS, HEADLINE)?)),
-            ("few", format!("{:.2}", gain(STEADY, (0.145, 0.01))?)),
-            ("ghost with", percent(ghost(HEADLINE, 1.0, 1)?)),
-            ("ghost without", percent(ghost(HEADLINE, 0.0, 1)?)),
-            ("ghost later", percent(ghost(HEADLINE, 1.0, 2)?)),
+            ("drift", format!("{:.2}", gain(DRIFTS, HEADLINE))),
+            ("few", format!("{:.2}", gain(STEADY, (0.145, 0.01)))),
+            ("ghost with", ghost(1.0, 1)),
+            ("ghost without", ghost(0.0, 1)),
+            ("ghost later", ghost(1.0, 2)),
         ]
         .into(),
-        tables: vec![("results/data/tracking.csv", csv)],
+        tables: vec![("results/data/tracking.csv", csv(part)?)],
         ..Results::default()
     })
+}
+
+fn csv(part: &Part) -> Result<String> {
+    let mut csv = "target,background,signal,tracking,right,wrong,cycles,cycles to notice,ghost 0,ghost 1,ghost 2,pixels\n".to_owned();
+    for point in part.points() {
+        let noticed = if point.parameter("target") == f64::from(JUMPS) {
+            format!("{:.1}", Measured::mean(point, "noticed").value)
+        } else {
+            String::new()
+        };
+        let at = point.parameter_cells(["target", "background", "signal", "tracking"]);
+        let reports = point.count_cells(["right", "wrong", "cycles"]);
+        let ghosts = point.count_cells(["ghost 0", "ghost 1", "ghost 2", "pixels"]);
+        writeln!(csv, "{at},{reports},{noticed},{ghosts}")?;
+    }
+    Ok(csv)
 }

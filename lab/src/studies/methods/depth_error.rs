@@ -1,6 +1,7 @@
 //! The error of a pulse's position, compared with the Cramér-Rao bound.
 
-use crate::sweep::mean::Measured;
+use crate::sweep::charts::{joined, level, level_key, panel};
+use crate::sweep::mean::{Measured, add, add_count};
 use crate::sweep::results::{Figure, Results, ends};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::{Context, Result};
@@ -12,7 +13,7 @@ use dtof_core::{
     SubBinOffset, WindowRule,
 };
 use dtof_data::options::rows::grouped;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart};
 use dtof_draw::palette::{self, Pen};
 use dtof_light::bounds::cramer_rao::Pulse;
 use dtof_light::looks::exposure::{Exposures, Looks};
@@ -156,20 +157,19 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             histogram.add_frame(frame, &RangeGate::full());
             true
         });
-        let mut count = |name: &str, by: u64| *tally.entry(name.to_owned()).or_default() += by;
-        count("histograms", 1);
+        add_count(&mut tally, "histograms", 1);
         let peak = histogram.peak();
         let middle = f64::from(peak.bin.raw()) + 0.5;
         if (middle - rates.position).abs() > 2.0 * sigma + 1.0 {
             // A false alarm, not an error of depth.
-            count("elsewhere", 1);
+            add_count(&mut tally, "elsewhere", 1);
             continue;
         }
         for (estimator, name) in Estimator::ALL {
             let position = estimator.position(&histogram, peak, sigma).raw();
             let square = u64::from(position.abs_diff(place.cast_signed())).pow(2);
-            count(name, square);
-            count(&format!("{name} fourths"), square.pow(2));
+            add_count(&mut tally, name, square);
+            add(&mut tally, name, "fourths", square.pow(2));
         }
     }
     Ok(tally)
@@ -219,16 +219,10 @@ fn summary(part: &Part, sigma: f64, name: &str) -> Measured {
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let bound = [SIGMAS[0], SIGMAS[SIGMAS.len() - 1]].map(|sigma| Dot::exact(sigma, 1.0));
     let panels = Estimator::ALL.map(|(estimator, name)| {
         let dots = SIGMAS.map(|sigma| summary(part, sigma, name).at(sigma));
-        Panel {
-            title: estimator.label(),
-            series: vec![
-                Series::unnamed(palette::REFERENCE, Style::Dashed, bound.into()),
-                Series::unnamed(estimator.pen(), Style::JoinedDots, dots.into()),
-            ],
-        }
+        let series = [level(&SIGMAS, 1.0), joined(estimator.pen(), dots)];
+        panel(estimator.label(), series)
     });
     let own = SIGMAS.map(|sigma| summary(part, sigma, "centred").interval.1);
     let most = own.into_iter().fold(0.0, f64::max);
@@ -242,11 +236,11 @@ fn results(part: &Part) -> Result<Results> {
         x: Axis::linear("pulse σ, bins"),
         y: Axis::logarithmic("root mean square depth error over the Cramér-Rao bound")
             .within(0.9, 9.0),
-        key: vec![Key::new(palette::REFERENCE, Style::Dashed, "the bound: pulse shape known, signal and background not")],
+        key: vec![level_key("the bound: pulse shape known, signal and background not")],
         columns: 3,
         panels: panels.into(),
     };
-    let histograms = part.one([])?.count("histograms");
+    let histograms = part.one([]).count("histograms");
     Ok(Results {
         figures: vec![Figure::new("depth-error", &chart)?],
         values: [("histograms", grouped(histograms))].into(),
@@ -258,15 +252,11 @@ fn results(part: &Part) -> Result<Results> {
 fn csv(part: &Part) -> Result<String> {
     let mut csv = "sigma,signal,background,elsewhere,method,error,low,high\n".to_owned();
     for point in part.points() {
-        let [sigma, signal, background] =
-            ["sigma", "signal", "background"].map(|name| point.parameter(name));
+        let at = point.parameter_cells(["sigma", "signal", "background"]);
         let elsewhere = point.share("elsewhere", "histograms").value;
         for (_, name) in Estimator::ALL {
             let error = over_bound(point, name).cells(3);
-            writeln!(
-                csv,
-                "{sigma},{signal},{background},{elsewhere:.4},{name},{error}"
-            )?;
+            writeln!(csv, "{at},{elsewhere:.4},{name},{error}")?;
         }
     }
     Ok(csv)

@@ -9,6 +9,7 @@ mod pixel;
 use self::pixel::{Pixel, exposure};
 use crate::studies::methods::passage::Rule;
 use crate::studies::methods::time_to_detect::signal;
+use crate::sweep::charts::{joined, joined_key, panel};
 use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, Study, Tally, grid};
@@ -16,7 +17,7 @@ use anyhow::Result;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{DepthEstimator, WindowRule};
 use dtof_data::options::rows::grouped;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
+use dtof_draw::chart::{Axis, Chart};
 use dtof_draw::palette::{CENTRED, PAPER};
 use dtof_light::rates::Rates;
 use rand_core::Rng;
@@ -125,7 +126,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 
 fn results(part: &Part) -> Result<Results> {
     let outcomes = outcomes(part)?;
-    let exposures = part.one([("target", 1.0)])?.count("exposures");
+    let exposures = part.one([("target", 1.0)]).count("exposures");
     Ok(Results {
         figures: vec![Figure::new("event-depth", &chart(&outcomes))?],
         values: [("exposures", grouped(exposures))].into(),
@@ -152,19 +153,13 @@ fn chart(outcomes: &[EventDepthOutcome]) -> Chart {
                     let error = outcome.errors[number].error;
                     error.at(outcome.background)
                 });
-                Series::unnamed(pen, Style::JoinedDots, dots.collect())
+                joined(pen, dots)
             });
-            panels.push(Panel {
-                title: format!("{rule}, σ {sigma}"),
-                series: series.collect(),
-            });
+            panels.push(panel(format!("{rule}, σ {sigma}"), series));
         }
     }
-    let names = ESTIMATORS.map(|(_, name)| name);
-    let key = names
-        .into_iter()
-        .zip(pens)
-        .map(|(text, pen)| Key::new(pen, Style::JoinedDots, text));
+    let estimators = ESTIMATORS.into_iter().zip(pens);
+    let key = estimators.map(|((_, name), pen)| joined_key(pen, name));
     // Whether the window is better than the centroid for the events of the paper's rule.
     let of_paper = || early().filter(|outcome| outcome.rule == Rule::Paper);
     let better = of_paper().filter(|outcome| outcome.better() == Some(1));

@@ -2,13 +2,13 @@
 //! magnitude.
 
 use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Passage, Rule, count_false};
+use crate::sweep::charts::{joined, level, level_key, panel};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::Result;
 use dtof_data::options::rows::grouped;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
-use dtof_draw::palette::REFERENCE;
+use dtof_draw::chart::{Axis, Chart, Panel};
 use dtof_light::looks::exposure::Exposures;
 use dtof_light::rates::Rates;
 use rand_pcg::Pcg64;
@@ -119,23 +119,16 @@ impl RuleOutcome {
         };
         let dots = self.shares.iter();
         let dots = dots.map(|(background, share)| share.at(*background));
-        let ends = [BACKGROUNDS[0], BACKGROUNDS[BACKGROUNDS.len() - 1]];
-        let line = ends.map(|background| Dot::exact(background, requested));
-        Panel {
-            title: format!("{}, {symbol} {:.2}", self.rule.short(), self.threshold),
-            series: vec![
-                Series::unnamed(REFERENCE, Style::Dashed, line.into()),
-                Series::unnamed(self.rule.pen(), Style::JoinedDots, dots.collect()),
-            ],
-        }
+        let title = format!("{}, {symbol} {:.2}", self.rule.short(), self.threshold);
+        let curve = joined(self.rule.pen(), dots);
+        panel(title, [level(&BACKGROUNDS, requested), curve])
     }
 }
 
 fn results(part: &Part) -> Result<Results> {
     let mut figures = Vec::new();
     let mut csv = "wanted,method,threshold,first_mean,share,low,high\n".to_owned();
-    let exposures =
-        |tested| anyhow::Ok(grouped(part.one([("tested", tested)])?.count("exposures")));
+    let exposures = |tested| grouped(part.one([("tested", tested)]).count("exposures"));
     for (requested, name) in TARGETS {
         let outcomes: Vec<RuleOutcome> = ladders()
             .iter()
@@ -152,13 +145,11 @@ fn results(part: &Part) -> Result<Results> {
             }
         }
         let percent = requested * 100.0;
-        // The paper's is the first of the rules.
         // The paper's rule with the quadrants and with the average, then the windows.
         let (papers, windows) = outcomes.split_at(2);
         let worst = |outcomes: &[RuleOutcome]| {
-            let factors = outcomes
-                .iter()
-                .map(|outcome| outcome.worst_factor(requested));
+            let outcomes = outcomes.iter();
+            let factors = outcomes.map(|outcome| outcome.worst_factor(requested));
             factors.fold(1.0, f64::max)
         };
         let [quadrants, average] = [0, 1].map(|at| {
@@ -182,11 +173,7 @@ fn results(part: &Part) -> Result<Results> {
             y: Axis::logarithmic("exposures with a false alarm, %")
                 .percent()
                 .within(requested / 1000.0, requested * 10.0),
-            key: vec![Key::new(
-                REFERENCE,
-                Style::Dashed,
-                format!("{percent} %, as wanted"),
-            )],
+            key: vec![level_key(format!("{percent} %, as wanted"))],
             columns: 3,
             panels: outcomes
                 .iter()
@@ -197,7 +184,7 @@ fn results(part: &Part) -> Result<Results> {
     }
     Ok(Results {
         figures,
-        values: [("calibrated", exposures(0.0)?), ("tested", exposures(1.0)?)].into(),
+        values: [("calibrated", exposures(0.0)), ("tested", exposures(1.0))].into(),
         tables: vec![("results/data/false_rate.csv", csv)],
         ..Results::default()
     })

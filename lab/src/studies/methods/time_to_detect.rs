@@ -5,12 +5,13 @@ mod time;
 
 use self::time::time;
 use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Passage, Rule, count_false};
-use crate::sweep::mean::Measured;
+use crate::sweep::charts::panel;
+use crate::sweep::mean::{Measured, add_count};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, point};
 use anyhow::Result;
 use dtof_data::options::rows::grouped;
-use dtof_draw::chart::{Axis, Chart, Panel, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Series, Style};
 use dtof_light::bounds::likelihood_ratio::{LikelihoodRatio, signal_for_information};
 use dtof_light::looks::exposure::Exposures;
 use dtof_light::rates::Rates;
@@ -111,7 +112,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
                     ("squares", lasted * lasted),
                 ];
                 for (what, count) in counts {
-                    *tally.entry(ladder.key(index, what)).or_default() += count;
+                    add_count(&mut tally, &ladder.key(index, what), count);
                 }
             }
         }
@@ -140,10 +141,8 @@ pub struct DetectionOutcome {
 }
 
 /// The outcomes of every rule in every scene with a target.
-///
-/// # Errors
-/// Fails if `part` is of another study.
-pub fn outcomes(part: &Part) -> Result<Vec<DetectionOutcome>> {
+#[must_use]
+pub fn outcomes(part: &Part) -> Vec<DetectionOutcome> {
     let mut outcomes = Vec::new();
     for sigma in SIGMAS {
         for (within, place) in PLACES {
@@ -153,7 +152,7 @@ pub fn outcomes(part: &Part) -> Result<Vec<DetectionOutcome>> {
                     ("background", background),
                     ("target", 1.0),
                     ("place", within),
-                ])?;
+                ]);
                 let first = outcomes.len();
                 for ladder in ladders() {
                     let rule = ladder.rule;
@@ -184,7 +183,7 @@ pub fn outcomes(part: &Part) -> Result<Vec<DetectionOutcome>> {
             }
         }
     }
-    Ok(outcomes)
+    outcomes
 }
 
 /// Whether an outcome is of `rule` with `sigma`, in tenths.
@@ -200,9 +199,9 @@ fn mean_ratio(outcomes: &[DetectionOutcome], sigma: f64, rule: Rule) -> f64 {
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let outcomes = outcomes(part)?;
+    let outcomes = outcomes(part);
     let mut figures = Vec::new();
-    let exposures = part.one([("target", 1.0)])?.count("exposures");
+    let exposures = part.one([("target", 1.0)]).count("exposures");
     for (name, sigma) in FIGURES.into_iter().zip(SIGMAS) {
         let means = Rule::RULES.map(|rule| (rule, mean_ratio(&outcomes, sigma, rule)));
         let best = means.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
@@ -216,10 +215,10 @@ fn results(part: &Part) -> Result<Results> {
                 let name = rule.short();
                 Series::named(name, rule.pen(), Style::JoinedDots, dots.collect())
             });
-            Panel {
-                title: format!("pulse {}", place.replace("centred", "centred in its bin")),
-                series: series.into(),
-            }
+            panel(
+                format!("pulse {}", place.replace("centred", "centred in its bin")),
+                series,
+            )
         });
         let bins = match best.0 {
             Rule::Window(width) => width.to_string(),

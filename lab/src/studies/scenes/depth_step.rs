@@ -111,24 +111,19 @@ fn add_step(tally: &mut Tally, sensor: &str, readings: &[Reading], at: u64, [old
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let series = |step: f64, y: &dyn Fn(&PointTally, &str) -> Measured| {
+    let by_signal = |step: f64, y: &dyn Fn(&PointTally, &str) -> Measured| {
+        let at = [("sigma", SIGMA), ("step", step)];
         let sensors = SENSORS.into_iter().enumerate();
-        let lines = sensors.map(|(number, sensor)| {
-            let points = part.at([("sigma", SIGMA), ("step", step)]).map(|point| {
-                let measured = y(point, sensor);
-                measured.at(point.parameter("signal"))
-            });
-            Series::named(sensor, pen(number), Style::JoinedDots, points.collect())
+        let series = sensors.map(|(number, sensor)| {
+            let dots = part.dots(at, "signal", |point| y(point, sensor));
+            Series::named(sensor, pen(number), Style::JoinedDots, dots)
         });
-        Panel::only(lines.collect())
+        Panel::only(series.collect())
     };
     let signal = || Axis::logarithmic("signal photons a laser cycle");
-    let at = |signal: f64| part.one([("sigma", SIGMA), ("step", EDGE), ("signal", signal)]);
-    let [events, frames] = [0, 4].map(|sensor| -> Result<[Measured; 2]> {
-        let of = |signal| anyhow::Ok(Measured::mean(at(signal)?, SENSORS[sensor]));
-        Ok([of(BRIGHT)?, of(DIM)?])
+    let [events, frames] = [0, 4].map(|sensor| {
+        [BRIGHT, DIM].map(|signal| Measured::mean(edge(part, signal), SENSORS[sensor]))
     });
-    let (events, frames) = (events?, frames?);
     let reaction = Chart {
         finding: format!(
             "A bright pixel reports a step after {:.0} laser cycles, a dim one no sooner than a long frame",
@@ -144,7 +139,7 @@ fn results(part: &Part) -> Result<Results> {
         y: Axis::logarithmic("laser cycles from a step of 0.75 m to its first reading, mean"),
         key: Vec::new(),
         columns: 1,
-        panels: vec![series(EDGE, &Measured::mean)],
+        panels: vec![by_signal(EDGE, &Measured::mean)],
     };
     let blurs_little = |point: &PointTally| {
         let mut sensors = SENSORS.into_iter();
@@ -165,7 +160,7 @@ fn results(part: &Part) -> Result<Results> {
         y: Axis::linear("exposures over a step of 75 mm that read as neither surface, %").percent(),
         key: Vec::new(),
         columns: 1,
-        panels: vec![series(STEPS_BINS[0], &|point, sensor| {
+        panels: vec![by_signal(STEPS_BINS[0], &|point, sensor| {
             neither(point, sensor, "mixed")
         })],
     };
@@ -174,10 +169,15 @@ fn results(part: &Part) -> Result<Results> {
             Figure::new("step-reaction", &reaction)?,
             Figure::new("step-blur", &blur)?,
         ],
-        claims: vec![latency_claim(part)?, blur_claim(part)?],
+        claims: vec![latency_claim(part), blur_claim(part)],
         values: [("steps", grouped(STEPS * part.seed_count()))].into(),
         ..Results::default()
     })
+}
+
+/// The point of the step of the verdict.
+fn edge(part: &Part, signal: f64) -> &PointTally {
+    part.one([("sigma", SIGMA), ("step", EDGE), ("signal", signal)])
 }
 
 /// The count `what` at every signal of a step, from dim to bright.
@@ -188,12 +188,9 @@ fn at_signals(part: &Part, step: f64, what: &str) -> String {
     counts.collect::<Vec<_>>().join(", ")
 }
 
-fn latency_claim(part: &Part) -> Result<Claim> {
-    let edge = part.one([("sigma", SIGMA), ("step", EDGE), ("signal", SIGNAL)])?;
-    let frames = SENSORS.map(|sensor| Measured::mean(edge, sensor));
-    let events = frames[0];
-    let bright = part.one([("sigma", SIGMA), ("step", EDGE), ("signal", BRIGHT)])?;
-    let dim = part.one([("sigma", SIGMA), ("step", EDGE), ("signal", DIM)])?;
+fn latency_claim(part: &Part) -> Claim {
+    let of = |signal| SENSORS.map(|sensor| Measured::mean(edge(part, signal), sensor));
+    let [bright, middle, dim] = [BRIGHT, SIGNAL, DIM].map(of);
     // The signal from which events are faster than frames of L2, with both pulses.
     let is_faster = |signal: f64| {
         let mut points = part.at([("step", EDGE), ("signal", signal)]);
@@ -202,12 +199,9 @@ fn latency_claim(part: &Part) -> Result<Claim> {
             events.interval.1 < frames.interval.0
         })
     };
-    let from = SIGNALS
-        .into_iter()
-        .rev()
-        .take_while(|&signal| is_faster(signal));
-    let from = from.last();
-    Ok(Claim::new(
+    let brightest_first = SIGNALS.into_iter().rev();
+    let from = brightest_first.take_while(|&at| is_faster(at)).last();
+    Claim::new(
         "latency",
         format!(
             "sooner than by frames of 2000 {}; a step is noticed after {:.0} laser cycles, by frames of 2000 after {:.0} \
@@ -215,10 +209,10 @@ fn latency_claim(part: &Part) -> Result<Claim> {
             from.map_or("at no signal".to_owned(), |from| format!(
                 "from {from} photons on"
             )),
-            events.value,
-            frames[4].value,
-            Measured::mean(dim, SENSORS[0]).value,
-            Measured::mean(dim, SENSORS[4]).value,
+            middle[0].value,
+            middle[4].value,
+            dim[0].value,
+            dim[4].value,
         ),
         Verdict::graded(
             from.is_some_and(|from| BRIGHT >= RANGE * from),
@@ -227,23 +221,23 @@ fn latency_claim(part: &Part) -> Result<Claim> {
     )
     .with_details(format!(
             "a step is noticed after {} laser cycles; by frames of 100 after {:.0}, of 500 {:.0}, of 1000 {:.0}, of 2000 {:.0} ({SIGNAL} signal photons a laser cycle); events {} and frames of 100 {} at {BRIGHT} photons; events {} and frames of 2000 {} at {DIM}; not noticed in {AFTER} laser cycles, and counted as {AFTER}: at 0.05, 0.1, 0.2, 0.5, 1, 2 photons {} of {} by events, {} by frames of 100, {} by frames of 2000",
-            events.text(0),
-            frames[1].value,
-            frames[2].value,
-            frames[3].value,
-            frames[4].value,
-            Measured::mean(bright, SENSORS[0]).text(0),
-            Measured::mean(bright, SENSORS[1]).text(0),
-            Measured::mean(dim, SENSORS[0]).text(0),
-            Measured::mean(dim, SENSORS[4]).text(0),
+            middle[0].text(0),
+            middle[1].value,
+            middle[2].value,
+            middle[3].value,
+            middle[4].value,
+            bright[0].text(0),
+            bright[1].text(0),
+            dim[0].text(0),
+            dim[4].text(0),
             at_signals(part, EDGE, "events not noticed"),
             grouped(STEPS * part.seed_count()),
             at_signals(part, EDGE, "frames of 100 not noticed"),
             at_signals(part, EDGE, "frames of 2000 not noticed"),
-        )))
+        ))
 }
 
-fn blur_claim(part: &Part) -> Result<Claim> {
+fn blur_claim(part: &Part) -> Claim {
     let mut details = Vec::new();
     let mut verdicts = Vec::new();
     for sigma in FPGA_SIGMAS {
@@ -265,7 +259,7 @@ fn blur_claim(part: &Part) -> Result<Claim> {
         worst.map_or("none".to_owned(), mixed::points)
     });
     let is = |verdict| verdicts.iter().filter(|&&other| other == verdict).count();
-    Ok(Claim::new(
+    Claim::new(
         "blur",
         format!(
             "more often read as neither surface than without the step, percentage points at worst, for steps of {} bins: {}",
@@ -282,7 +276,7 @@ fn blur_claim(part: &Part) -> Result<Claim> {
     .with_details(format!(
             "percentage points by which an event over the step is read as neither surface more often than the same exposure without it, at 0.05, 0.1, 0.2, 0.5, 1, 2 signal photons a laser cycle: {}",
             details.join("; ")
-        )))
+        ))
 }
 
 #[cfg(test)]

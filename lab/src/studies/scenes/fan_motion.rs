@@ -225,7 +225,7 @@ fn results(part: &Part) -> Result<Results> {
     let mut series = Vec::new();
     let mut holds = true;
     for (pulse, pen) in [PULSES[2], PULSES[0]].into_iter().zip(STEPS) {
-        let point = at(part, pulse)?;
+        let point = at(part, pulse);
         let blurs = SENSORS.map(|sensor| blur(point, sensor));
         let edges = edges_per_cycle(&scene(&point.parameters, 0.0)?)?;
         let dots = blurs.iter().map(|blur| blur.mixed.at(blur.exposure));
@@ -258,7 +258,7 @@ fn results(part: &Part) -> Result<Results> {
         columns: 1,
         panels: vec![Panel::only(series)],
     };
-    let fpga = at(part, PULSES[2])?;
+    let fpga = at(part, PULSES[2]);
     let readings = |sensor: usize| grouped(blur(fpga, SENSORS[sensor]).readings);
     Ok(Results {
         figures: vec![Figure::new("fan-mixed", &chart)?],
@@ -268,7 +268,7 @@ fn results(part: &Part) -> Result<Results> {
     })
 }
 
-fn at(part: &Part, (fpga, sigma): (f64, f64)) -> Result<&PointTally> {
+fn at(part: &Part, (fpga, sigma): (f64, f64)) -> &PointTally {
     part.one([("fpga", fpga), ("sigma", sigma)])
 }
 
@@ -288,7 +288,7 @@ fn path(point: &PointTally) -> Result<(f64, String)> {
 
 /// The PC's claim.
 fn visible(part: &Part) -> Result<Claim> {
-    let point = at(part, PULSES[0])?;
+    let point = at(part, PULSES[0]);
     let (path, text) = path(point)?;
     let right = |sensor: usize| {
         let readings = blur(point, SENSORS[sensor]).readings;
@@ -314,7 +314,7 @@ fn sharp(part: &Part) -> Result<Claim> {
     let mut excesses = Vec::new();
     let mut is_short = true;
     for pulse in [PULSES[1], PULSES[2]] {
-        let point = at(part, pulse)?;
+        let point = at(part, pulse);
         let (path, text) = path(point)?;
         is_short &= path < 0.1;
         paths.push(path);

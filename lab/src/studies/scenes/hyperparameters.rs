@@ -15,9 +15,9 @@ mod claims;
 mod setting;
 
 use self::setting::{Setting, error, false_share};
+use crate::sweep::charts::panel;
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
-use crate::sweep::values::Values;
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally, whole};
 use anyhow::Result;
 use dtof_core::fixed::types::U8F8;
@@ -145,12 +145,14 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let mut values = Values::from([("pixels", grouped(part.seed_count()))]);
-    values.set("table", table(part));
     Ok(Results {
         figures: figures(part)?,
         claims: claims::claims(part),
-        values,
+        values: [
+            ("pixels", grouped(part.seed_count())),
+            ("table", table(part)),
+        ]
+        .into(),
         ..Results::default()
     })
 }
@@ -162,11 +164,7 @@ fn table(part: &Part) -> String {
         for setting in Setting::at_low_background(part, is_average) {
             let shares = setting.by_snr(4, 20).into_iter().map(|point| {
                 let share = false_share(point).times(100.0);
-                format!(
-                    "{:.1} ±{:.1}",
-                    share.value,
-                    (share.interval.1 - share.interval.0) / 2.0
-                )
+                share.with_half(1)
             });
             let cells: Vec<String> = shares.collect();
             rows += &format!(
@@ -182,10 +180,8 @@ fn table(part: &Part) -> String {
 fn figures(part: &Part) -> Result<Vec<Figure>> {
     let [_, setting] = Setting::at_low_background(part, true);
     let dots = |points: Vec<&PointTally>, of: fn(&PointTally) -> Measured| -> Vec<Dot> {
-        let points = points.into_iter();
-        points
-            .map(|point| of(point).at(point.parameter("snr")))
-            .collect()
+        let dot = |point: &PointTally| of(point).at(point.parameter("snr"));
+        points.into_iter().map(dot).collect()
     };
     let joined = |name: String, pen, points| Series::named(name, pen, Style::JoinedDots, points);
     let backgrounds = [(false, "two quadrants"), (true, "average of all bins")];
@@ -198,10 +194,7 @@ fn figures(part: &Part) -> Result<Vec<Figure>> {
                 let points = dots(setting.by_snr(4, 20), false_share);
                 joined(format!("σ {} bins", setting.sigma), pen, points)
             });
-        Panel {
-            title: title.to_owned(),
-            series: series.collect(),
-        }
+        panel(title, series)
     });
     // Compared point by point, at equal pulse and SNR.
     let more = [0, 1].into_iter().all(|pulse| {

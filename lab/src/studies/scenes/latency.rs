@@ -11,7 +11,6 @@ use self::element::{LONG_STAGES, PIPELINE, PIXELS, ProcessingElement, SharedPixe
 use super::one_pixel::{BINS, CODES, PROTOTYPE_X, prototype};
 use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Figure, Results};
-use crate::sweep::values::Values;
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
 use anyhow::Result;
 use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, Statistics};
@@ -183,16 +182,18 @@ fn share_by(point: &PointTally, what: &str, by: u64) -> Measured {
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let mut values = Values::from([("events", grouped(EVENTS * part.seed_count()))]);
-    values.set("readings", readings(part));
-    values.set("subgroups", claims::subgroups());
     Ok(Results {
         figures: vec![
             Figure::new("latency", &by_then(part))?,
             Figure::new("latency-processing", &processing(part))?,
         ],
-        claims: claims::claims(part)?,
-        values,
+        claims: claims::claims(part),
+        values: [
+            ("events", grouped(EVENTS * part.seed_count())),
+            ("readings", readings(part)),
+            ("subgroups", claims::subgroups()),
+        ]
+        .into(),
         ..Results::default()
     })
 }
@@ -244,7 +245,8 @@ fn processing(part: &Part) -> Chart {
         .into_iter()
         .zip(STEPS)
         .map(|(element, pen)| {
-            let dots = shared_points(part).map(|point| {
+            let points = shared_points(part);
+            let dots = points.map(|point| {
                 let mean = Measured::mean(point, &next(element));
                 mean.at(point.parameter("snr"))
             });
@@ -286,10 +288,7 @@ fn readings(part: &Part) -> String {
             let point = points.next();
             for what in [first, next] {
                 let mean = point.map(|point| Measured::mean(point, &what(element)));
-                let cell = mean.map_or("cut off".to_owned(), |mean| {
-                    let half = (mean.interval.1 - mean.interval.0) / 2.0;
-                    format!("{:.1} ±{half:.1}", mean.value)
-                });
+                let cell = mean.map_or("cut off".to_owned(), |mean| mean.with_half(1));
                 rows += &format!(" {cell} |");
             }
         }

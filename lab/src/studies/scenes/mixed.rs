@@ -68,10 +68,7 @@ pub fn excess(point: &PointTally, sensor: &str) -> Measured {
     let (more, fewer) = (count("mixed alone") + 0.5, count("clean alone") + 0.5);
     let value = (more - fewer) / pairs;
     let half = Z_99 * ((more + fewer) / pairs - value * value).max(0.0).sqrt() / pairs.sqrt();
-    Measured {
-        value,
-        interval: (value - half, value + half),
-    }
+    Measured::plus_minus(value, half)
 }
 
 /// The excess in percentage points, as text.

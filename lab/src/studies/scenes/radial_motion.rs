@@ -135,7 +135,7 @@ fn lag(point: &PointTally, sensor: &str) -> Lag {
     }
 }
 
-fn at(part: &Part, (fpga, sigma): (f64, f64), signal: f64, speed: f64) -> Result<&PointTally> {
+fn at(part: &Part, (fpga, sigma): (f64, f64), signal: f64, speed: f64) -> &PointTally {
     part.one([
         ("fpga", fpga),
         ("sigma", sigma),
@@ -160,7 +160,7 @@ fn figure(part: &Part, name: &'static str, pulse: (f64, f64)) -> Result<Figure> 
         series.push(Series::named(sensor, pen, Style::Dashed, half.collect()));
         series.push(Series::unnamed(pen, Style::Dots, measured.collect()));
     }
-    let fastest = at(part, pulse, SIGNAL, 100.0)?;
+    let fastest = at(part, pulse, SIGNAL, 100.0);
     let system = System::of(&fastest.parameters).name;
     let [events, frames] = [0, 4].map(|sensor| lag(fastest, SENSORS[sensor]).mm);
     let times = frames.value / events.value;
@@ -190,7 +190,7 @@ fn results(part: &Part) -> Result<Results> {
         let mut follows = true;
         let mut shares = Vec::new();
         for signal in SIGNALS {
-            let fast = at(part, pulse, signal, FAST)?;
+            let fast = at(part, pulse, signal, FAST);
             let [event, frame] = [0, 4].map(|sensor| lag(fast, SENSORS[sensor]));
             follows &= event.path_mm < event.noise_mm;
             shares.push(100.0 * event.path_mm / event.noise_mm);

@@ -6,7 +6,6 @@ use super::{FPGA_SIGNAL, REFERENCES, SIGNALS};
 use crate::sweep::Part;
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Verdict, span};
-use anyhow::{Context, Result};
 use dtof_data::options::rows::grouped;
 
 /// Changes per event below which a wall counts as silent.
@@ -89,7 +88,7 @@ fn motion(of: &ChangeOutcome) -> String {
     )
 }
 
-pub fn claims(part: &Part) -> Result<Vec<Claim>> {
+pub fn claims(part: &Part) -> Vec<Claim> {
     let from = |holds: fn(&ChangeOutcome) -> bool| {
         Background::ALL.map(|background| holding(part, background, holds))
     };
@@ -101,7 +100,7 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
     let silent = from(is_silent);
     let changes =
         |of: &ChangeOutcome| Measured::share(of.still.changes, of.still.events).value * 1000.0;
-    let fpga = part.one([("fpga", 1.0)])?;
+    let fpga = part.one([("fpga", 1.0)]);
     let fpga = [0, 1].map(|way| outcome(fpga, Background::Quadrants, REFERENCES[way].1));
     let cars = [0, 1].map(|way| on_pc(part, 0.0, Background::Average, way));
     let finds = |of: &ChangeOutcome| of.found.interval.0 > 0.9 && of.is_false.value < 0.5;
@@ -109,10 +108,7 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
         let mut outcomes = cars[way].iter().map(|car| &car.1).chain([&fpga[way]]);
         outcomes.any(finds)
     });
-    let brightest = |way: usize| {
-        let car = cars[way].last().context("no signals")?;
-        anyhow::Ok(&car.1)
-    };
+    let brightest = |way: usize| &cars[way][SIGNALS.len() - 1].1;
     let on_the_car = cars[0]
         .iter()
         .map(|(_, of)| percent(Measured::share(of.moving.changes, of.changes)));
@@ -120,7 +116,7 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
     let redundant = from(fewer);
     let fewer_events = from(|of| of.still.a_frame(of.still.events).interval.1 < 1.0);
     let more = from(|of| of.moving.a_frame(of.moving.events).interval.0 > 2.0);
-    Ok(vec![
+    vec![
         Claim::new(
             "removed",
             format!(
@@ -141,8 +137,8 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
             "motion",
             format!(
                 "steps found against the mean before {}, reported last {} (car, {} photons); on the FPGA {}, {}",
-                percent(brightest(0)?.found),
-                percent(brightest(1)?.found),
+                percent(brightest(0).found),
+                percent(brightest(1).found),
                 SIGNALS[SIGNALS.len() - 1],
                 percent(fpga[0].found),
                 percent(fpga[1].found)
@@ -154,8 +150,8 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
                  changes that are of the car and not of the wall, at {}: {}; \
                  FPGA at {FPGA_SIGNAL}: against the mean before {}; against the mean reported last {}",
                 SIGNALS[SIGNALS.len() - 1],
-                motion(brightest(0)?),
-                motion(brightest(1)?),
+                motion(brightest(0)),
+                motion(brightest(1)),
                 signals(),
                 on_the_car.collect::<Vec<_>>().join(", "),
                 motion(&fpga[0]),
@@ -211,5 +207,5 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
             with_both(part, |of| times(of.still.a_frame(of.still.events))),
             with_both(part, |of| times(of.still.a_frame(of.still.changes)))
         )),
-    ])
+    ]
 }

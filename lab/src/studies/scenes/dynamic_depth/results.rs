@@ -1,12 +1,13 @@
 //! The figures and the table.
 
-use super::super::systems::Background;
+use super::super::systems::{Background, System};
 use super::claims::claims;
 use super::outcome::{ChangeOutcome, REMOVED, SCENES, at_text, holding, on_pc, outcome};
 use super::{REFERENCES, SIGNALS};
-use crate::sweep::Part;
+use crate::sweep::charts::{joined, joined_key, panel};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, whole};
 use anyhow::Result;
 use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
@@ -20,7 +21,7 @@ pub fn results(part: &Part) -> Result<Results> {
     });
     Ok(Results {
         figures: vec![left(part)?, a_frame(part)?],
-        claims: claims(part)?,
+        claims: claims(part),
         values: [("steps", grouped(steps.sum()))].into(),
         tables: vec![("results/data/dynamic-depth.csv", csv(part)?)],
     })
@@ -34,21 +35,18 @@ fn left(part: &Part) -> Result<Figure> {
             let series = [0, 1].map(|reference| {
                 let points = on_pc(part, fan, background, reference).into_iter();
                 let dots = points.map(|(signal, outcome)| outcome.left.at(signal));
-                Series::unnamed(pens[reference], Style::JoinedDots, dots.collect())
+                joined(pens[reference], dots)
             });
-            let limit = [SIGNALS[0], SIGNALS[SIGNALS.len() - 1]];
-            let limit = limit.map(|signal| Dot::exact(signal, 1.0 - REMOVED));
-            let limit = Series::unnamed(NEUTRAL, Style::Dashed, limit.to_vec());
-            panels.push(Panel {
-                title: format!("{scene}, {}", background.name()),
-                series: series.into_iter().chain([limit]).collect(),
-            });
+            let ends = [SIGNALS[0], SIGNALS[SIGNALS.len() - 1]];
+            let limit = Dot::curve(ends, |_| 1.0 - REMOVED);
+            let limit = Series::unnamed(NEUTRAL, Style::Dashed, limit);
+            let title = format!("{scene}, {}", background.name());
+            panels.push(panel(title, series.into_iter().chain([limit])));
         }
     }
     let from = holding(part, Background::Average, |of| {
         of.removed.interval.0 > REMOVED
     });
-    let key = |text: &str, pen| Key::new(pen, Style::JoinedDots, text);
     let chart = Chart {
         finding: format!(
             "With the average, dynamic depth takes away over 70 % {}",
@@ -59,8 +57,8 @@ fn left(part: &Part) -> Result<Figure> {
         x: Axis::logarithmic("signal photons a laser cycle"),
         y: Axis::logarithmic("changes reported, % of the events").percent(),
         key: vec![
-            key("against the mean before (paper)", PAPER),
-            key("against the mean reported last", EVENTS),
+            joined_key(PAPER, "against the mean before (paper)"),
+            joined_key(EVENTS, "against the mean reported last"),
             Key::new(NEUTRAL, Style::Dashed, "the paper's 30 % that are left"),
         ],
         columns: 2,
@@ -78,7 +76,7 @@ fn a_frame(part: &Part) -> Result<Figure> {
     };
     let events = dots(|of| of.still.a_frame(of.still.events));
     let changes = dots(|of| of.still.a_frame(of.still.changes));
-    let one = SIGNALS.map(|signal| Dot::exact(signal, 1.0)).to_vec();
+    let one = Dot::curve(SIGNALS, |_| 1.0);
     let most = |dots: &[Dot]| dots.iter().map(|dot| dot.y).fold(0.0, f64::max);
     let chart = Chart {
         finding: format!(
@@ -106,16 +104,8 @@ fn csv(part: &Part) -> Result<String> {
                    delay_cycles,false,false_from,false_to,still_pixels,still_frames,still_events,still_changes\n"
         .to_owned();
     for point in part.points() {
-        let system = if point.is_at([("fpga", 1.0)]) {
-            "FPGA"
-        } else {
-            "PC"
-        };
-        let scene = if point.is_at([("fan", 1.0)]) {
-            "fan"
-        } else {
-            "car"
-        };
+        let system = System::of(&point.parameters).name;
+        let (_, scene) = SCENES[usize::from(whole(&point.parameters, "fan"))];
         for background in Background::ALL {
             for (_, reference) in REFERENCES {
                 let of = outcome(point, background, reference);

@@ -4,12 +4,13 @@ use super::super::one_pixel::PER_BIN;
 use super::claims::claims;
 use super::surfaces::surfaces;
 use super::{DEPTHS, ESTIMATES, NOISES, PC_L1, PC_LIGHTS};
+use crate::sweep::charts::{joined, joined_key, panel};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, PointTally};
 use anyhow::Result;
 use dtof_data::options::rows::grouped;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Panel, Point as Dot};
 use dtof_draw::palette::STEPS;
 use std::f64::consts::SQRT_2;
 
@@ -31,15 +32,12 @@ fn by_signal(
     measured: impl Fn(&PointTally, &str) -> Measured,
     holds: impl Fn(&[Vec<Dot>]) -> bool,
 ) -> Result<Chart> {
-    let panel = |title: &str| Panel {
-        title: title.to_owned(),
-        series: Vec::new(),
-    };
-    let mut panels: Vec<Panel> = shown.names.iter().map(|name| panel(name.1)).collect();
+    let names = shown.names.iter();
+    let mut panels: Vec<Panel> = names.map(|name| panel(name.1, [])).collect();
     let mut all_hold = true;
     let mut key = Vec::new();
     for ((background, _), pen) in PC_LIGHTS.into_iter().zip([STEPS[3], STEPS[0]]) {
-        let point = part.one([("fpga", 0.0), ("average", 1.0), ("background", background)])?;
+        let point = part.one([("fpga", 0.0), ("average", 1.0), ("background", background)]);
         let mut all = Vec::new();
         for ((name, _), panel) in shown.names.iter().zip(&mut panels) {
             let dots = surfaces(point)?
@@ -48,17 +46,11 @@ fn by_signal(
             // Without an event there is nothing to draw.
             let mut dots: Vec<Dot> = dots.filter(|dot| dot.y.is_finite()).collect();
             dots.sort_by(|a, b| a.x.total_cmp(&b.x));
-            panel
-                .series
-                .push(Series::unnamed(pen, Style::JoinedDots, dots.clone()));
+            panel.series.push(joined(pen, dots.clone()));
             all.push(dots);
         }
         all_hold &= holds(&all);
-        key.push(Key::new(
-            pen,
-            Style::JoinedDots,
-            format!("B = {background}"),
-        ));
+        key.push(joined_key(pen, format!("B = {background}")));
     }
     Ok(Chart {
         finding: shown.finding.to_owned(),
