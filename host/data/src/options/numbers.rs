@@ -36,7 +36,7 @@ where
 /// The most laser cycles a second: 64 bits hold the rate in millihertz.
 pub const MAX_LASER_HZ: u64 = 1_000_000_000_000;
 
-/// `1 / share`, rounded up and saturating: the argument of [`z_for_levels`](dtof_core::z_for_levels).
+/// `1 / share`, rounded up and saturating: the argument of [`z_for_levels`](dtof_core::rule::z_for_levels).
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 pub fn one_in(share: f64) -> u32 {
