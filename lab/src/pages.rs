@@ -8,6 +8,7 @@ mod bus;
 pub mod failures;
 pub mod methods;
 mod movie;
+mod pixel;
 mod timing;
 
 use crate::studies::beyond::dither;
@@ -189,6 +190,7 @@ pub fn documents(
     ];
     documents.extend(failures.map(|(path, content)| (path.into(), content)));
     documents.push(("figures/demo.svg".into(), movie::demo()?));
+    documents.push(("figures/pixel.svg".into(), pixel::pixel()?));
     documents.push(("figures/processing.svg".into(), timing::timing()));
     Ok(documents)
 }

@@ -97,23 +97,19 @@ fn neighbours_need_the_window_rule_without_blocks_and_without_a_dead_time() {
         };
         assert_eq!(device(&plain), Ok(()));
     }
-    // A TDC of the first photon only is a flag, and the sensor's dead time is not weighed either.
-    for (dead_time, of_sensor) in [(Some(128), 0), (None, 0), (None, 128)] {
+    // A dead time is weighed whoever says it, also that of a TDC of the first photon.
+    for (dead_time, of_sensor, is_built) in [
+        (Some(0), 128, true),
+        (Some(128), 0, false),
+        (None, 0, true),
+        (None, 128, false),
+    ] {
         let configuration = with(Configuration {
             dead_time,
             ..configuration()
         });
-        let built = configuration.pixel_config::<BINS>(of_sensor).is_ok();
-        let weighs = Configuration {
-            neighbours: None,
-            ..configuration
-        };
-        let weighs = weighs.pixel_config::<BINS>(of_sensor).unwrap();
-        assert_eq!(
-            built,
-            !weighs.weighs_dead_time(),
-            "{dead_time:?} {of_sensor}"
-        );
+        let built = configuration.pixel_config::<BINS>(of_sensor);
+        assert_eq!(built.is_ok(), is_built, "{dead_time:?} {of_sensor}");
     }
 }
 

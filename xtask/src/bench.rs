@@ -129,8 +129,8 @@ pub fn rows(output: &str, level: &str) -> Result<Vec<Row>> {
 /// A table of clock cycles on a real board, beside the instructions of `board` in the emulator, or
 /// of an emulated board with the same instruction set.
 pub fn beside(root: &Path, board: Board, rows: &[Row]) -> Result<String> {
-    let of_target = |of: &&Processor| of.board.target() == board.target();
-    let of_like = PROCESSORS.iter().find(of_target).or(PROCESSORS.first());
+    let like = board.row().counts_like;
+    let of_like = PROCESSORS.iter().find(|processor| processor.board == like);
     let file = of_like.context("no figures of this board")?.file;
     let counted = parse(&fs::read_to_string(root.join(file)).context(file)?).context(file)?;
     let mut text = String::from("\n| operation | clock cycles | instructions |\n|---|---|---|\n");

@@ -28,6 +28,8 @@ pub struct Row {
     pub chip: Option<&'static str>,
     /// What runs its images on a computer.
     pub emulator: Emulator,
+    /// The board whose counted instructions are like its own, for `cargo xtask bench`.
+    pub counts_like: Board,
     /// The binary of its sidecar. Boards may share one.
     pub sidecar: &'static str,
     /// The sensors that its sidecar drives.
@@ -42,11 +44,11 @@ pub struct Row {
 pub enum Emulator {
     /// Nothing: they are linked and measured only.
     None,
-    /// QEMU, with arguments; images have one more feature for it, and it is known to run in one version.
+    /// QEMU, with arguments; images may have one more feature for it, and may be known to run in one version only.
     Qemu {
         arguments: &'static [&'static str],
         feature: Option<&'static str>,
-        version: &'static str,
+        version: Option<&'static str>,
     },
     /// rp2040js in Node.js.
     Rp2040js,
@@ -76,8 +78,9 @@ impl Board {
                 emulator: Emulator::Qemu {
                     arguments: &["-machine", "mps2-an386"],
                     feature: None,
-                    version: "",
+                    version: None,
                 },
+                counts_like: Self::Mps2An386,
                 sidecar: "sidecar-mps2-an386",
                 sensors: &[],
                 most_flash: None,
@@ -90,6 +93,7 @@ impl Board {
                 uf2_family: Some(uf2::RP2040),
                 chip: Some("RP2040"),
                 emulator: Emulator::Rp2040js,
+                counts_like: Self::Pico,
                 sidecar: "sidecar-pico",
                 sensors: &[Sensor::PhotonTimer],
                 most_flash: None,
@@ -102,6 +106,7 @@ impl Board {
                 uf2_family: Some(uf2::RP2350_ARM_S),
                 chip: Some("RP235x"),
                 emulator: Emulator::None,
+                counts_like: Self::Mps2An386,
                 sidecar: "sidecar-pico",
                 sensors: &[Sensor::PhotonTimer],
                 most_flash: None,
@@ -121,8 +126,9 @@ impl Board {
                     // QEMU's has no PLL.
                     feature: Some("pll-off"),
                     // QEMU 10, for instance, ends at a reset of the clocks.
-                    version: "version 7.2.",
+                    version: Some("version 7.2."),
                 },
+                counts_like: Self::Mps2An386,
                 sidecar: "sidecar-stm32f405",
                 sensors: &[
                     Sensor::Tdc7200,

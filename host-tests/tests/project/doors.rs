@@ -96,7 +96,7 @@ pub fn files(folder: &Path, ends: &[&str], found: &mut Vec<(String, String)>) {
                 name,
                 "target" | "out" | "corpus" | "artifacts" | "node_modules"
             );
-            if !is_built && (!name.starts_with('.') || name == ".ci") {
+            if !is_built && (!name.starts_with('.') || [".ci", ".github"].contains(&name)) {
                 files(&path, ends, found);
             }
             continue;

@@ -3,12 +3,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The pages in `folder`, and in `docs` below it.
+/// The pages in `folder`, and in `docs` and `.github` below it.
 fn pages(folder: &Path, pages: &mut Vec<PathBuf>) {
     let entries = fs::read_dir(folder).unwrap();
     for path in entries.map(|entry| entry.unwrap().path()) {
         if path.is_dir() {
-            if path.ends_with("docs") || folder.ends_with("docs") || folder.ends_with("results") {
+            if path.ends_with("docs")
+                || path.ends_with(".github")
+                || folder.ends_with("docs")
+                || folder.ends_with("results")
+            {
                 self::pages(&path, pages);
             }
         } else if path.extension().is_some_and(|extension| extension == "md") {

@@ -8,9 +8,12 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// The libraries of the host have an example in their README only.
+/// Most libraries of the host have an example in their README only.
 fn is_of_host(package: &Value) -> bool {
-    folder(package).parent().unwrap().ends_with("host") && package["name"] != "dtof"
+    let is_of_more = ["dtof", "dtof-draw", "dtof-light"]
+        .iter()
+        .any(|name| package["name"] == *name);
+    folder(package).parent().unwrap().ends_with("host") && !is_of_more
 }
 
 /// The most bytes of a package before compression.

@@ -18,7 +18,7 @@
 //! ```
 //!
 //! Each effect has its own random numbers: switching one on does not change the others.
-
+//!
 //! ## Laws
 //!
 //! | module | contents | source |

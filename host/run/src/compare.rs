@@ -34,10 +34,11 @@
 //!
 //! ## What it does not know
 //!
-//! - It opens no recording. The caller has a `PhotonSource` for each seed.
+//! - `compare` opens no recording: the caller, as `job`, has a `PhotonSource` for each seed.
 //! - It knows no flags and no device.
 //! - Cost is the instruction count of a Cortex-M4F, from a table. It is not measured on this computer.
 //! - A trial with fewer than 100 reports does not count.
+//!
 //! ## Time against error
 //!
 //! Every rule gets the threshold that gives the requested rate of false alarms in simulated exposures

@@ -49,6 +49,7 @@
 //! - An AER file has no angles. Without a calibration file, pixels are those of a pinhole camera of 60 degrees.
 //! - If the laser rate is not known, times are for 10 MHz, and a warning says so.
 //! - EVT2 holds 2³⁴ microseconds and 2048 pixels a side. More is refused.
+//!
 //! ## From events to a file
 //!
 //! The AER file is read twice: to count the events up to its end or to where it is damaged, and to

@@ -34,6 +34,7 @@
 //! - It writes no file. A page is a `String`.
 //! - It knows no comparison and no calibration; both make their pages with it.
 //! - A figure is placed in the page as it is: it must come from a source you trust.
+
 /// A JavaScript module of this folder. Paths of modules begin at `host`.
 macro_rules! module {
     ($path:literal) => {

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, ensure};
 
 /// How long a program may take that ends by itself: only one that hangs takes as long, even on a
 /// computer that does much else.
-const PATIENCE: Duration = Duration::from_secs(3600);
+const PATIENCE: Duration = Duration::from_secs(1800);
 
 /// The end of a program and its output.
 pub struct ProgramRun {

@@ -26,7 +26,7 @@ use dtof_data::random::trial_rng;
 const PHOTONS: f64 = 5e8;
 /// Trials that share the exposures.
 const TRIALS: u16 = 64;
-/// Their numbers, which no other simulation of this crate uses.
+/// Their numbers, which no other simulation of `tune` uses.
 pub(super) const NUMBERS: Range<u16> = 1000..1000 + TRIALS;
 /// The most exposures of a trial.
 const LONGEST_TRIAL: f64 = 2000.0;

@@ -108,7 +108,7 @@ fn place(flow: &Flow, kinds: &[Kind]) -> Result<Vec<Placements>> {
     };
     let workers = thread::available_parallelism()?.get().div_ceil(2);
     let workers = ThreadPoolBuilder::new().num_threads(workers).build()?;
-    workers.install(|| kinds.par_iter().map(place).collect())
+    workers.install(|| kinds.par_iter().with_max_len(1).map(place).collect())
 }
 
 /// `VexRiscv`'s cycles for what the tree does.
