@@ -1,9 +1,10 @@
 //! What a configuration builds, and the combinations that it refuses.
 
+use dtof_core::events::ZeroThresholdError;
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
-    AnyRule, Array, ArrayConfig, BlockLevel, Count, Count16, Neighbours, PaperRule, PixelConfig,
-    WindowRule,
+    AnyRule, Array, ArrayConfig, ArrayError, BlockLevel, Count, Count16, GateError, Neighbours,
+    PaperRule, PixelConfig, PixelConfigError, RangeScaleError, WindowRule, WindowWidthError,
 };
 use dtof_link::{AdaptiveBinning, Configuration, Refusal};
 
@@ -154,4 +155,43 @@ fn pixels_without_columns_are_a_row_which_has_neither_blocks_nor_neighbours() {
     let binning = blocks(40);
     let with = Configuration { binning, ..row };
     assert_eq!(device(&with), Err(Refusal::Blocks));
+}
+
+#[test]
+fn every_error_of_the_core_is_a_refusal() {
+    let of_pixels = [
+        (PixelConfigError::ZeroX, Refusal::ZeroX),
+        (PixelConfigError::XAboveL1, Refusal::XAboveL1),
+        (PixelConfigError::L2NotAboveL1, Refusal::L2NotAboveL1),
+        (PixelConfigError::NoLook, Refusal::NoLook),
+    ];
+    for (error, refusal) in of_pixels {
+        assert_eq!(Refusal::from(error), refusal);
+    }
+    let of_arrays = [
+        (ArrayError::Pixels, Refusal::Pixels),
+        (ArrayError::Layout, Refusal::Pixels),
+        (ArrayError::Blocks, Refusal::Blocks),
+        (ArrayError::NoLevel, Refusal::Blocks),
+        (ArrayError::OtherLooks, Refusal::Blocks),
+        (ArrayError::BlocksAndNeighbours, Refusal::Neighbours),
+        (ArrayError::NeighboursAndDeadTime, Refusal::Neighbours),
+        // No configuration leads to it.
+        (ArrayError::OtherRoom, Refusal::Unknown),
+    ];
+    for (error, refusal) in of_arrays {
+        assert_eq!(Refusal::from(error), refusal);
+    }
+    let of_gates = [
+        (GateError::PastLastBin, Refusal::GatePastLastBin),
+        (GateError::TooNarrow, Refusal::GateTooNarrow),
+    ];
+    for (error, refusal) in of_gates {
+        assert_eq!(Refusal::from(error), refusal);
+    }
+    for error in [RangeScaleError::ZeroBinWidth, RangeScaleError::OutOfRange] {
+        assert_eq!(Refusal::from(error), Refusal::Range);
+    }
+    assert_eq!(Refusal::from(WindowWidthError), Refusal::WindowWidth);
+    assert_eq!(Refusal::from(ZeroThresholdError), Refusal::ZeroThreshold);
 }
