@@ -102,6 +102,7 @@ fn qemu(arguments: &[&str], image: &Path, port: Option<u16>, word: Option<&str>)
 /// Runs an image that ends, with additional arguments for the emulator. Returns its exit status and
 /// its output.
 pub fn run(board: Board, image: &Path, arguments: &[&str]) -> Result<(ExitStatus, String)> {
+    // The emulator has to be there; whether its version is known is for the caller.
     cannot_run(board)?;
     let mut command = command(board, image, None, None)?;
     let program = command.get_program().display().to_string();
