@@ -84,27 +84,40 @@ pub struct Output {
 }
 
 impl Output {
-    /// Creates the folder if it does not exist, and begins the event files for the array of `source`.
+    /// Checks that a run which reads the files `inputs` may write into `folder`.
     ///
     /// # Errors
-    /// Fails if nothing can be written there, if another run writes there, if the range scale is invalid, or if a
-    /// result would replace `input` or a file that no run has written.
-    pub fn create(
-        folder: &Path,
-        settings: &Settings,
-        source: &dyn PhotonSource,
-        input: Option<&Path>,
-    ) -> Result<Self> {
-        let ranges = settings.ranges(source.array())?;
+    /// Fails if the folder holds the results of a comparison, or if a result would replace one of `inputs` or a file that
+    /// no run has written.
+    pub fn check(folder: &Path, inputs: &[PathBuf]) -> Result<()> {
         ensure!(
             !folder.join("methods.csv").exists(),
             "{}: holds the results of a comparison; take another folder",
             folder.display()
         );
+        match folder.is_dir() {
+            true => may_hold_results(folder, inputs),
+            // It is created later.
+            false => Ok(()),
+        }
+    }
+
+    /// Creates the folder if it does not exist, and begins the event files for the array of `source`. The run reads the
+    /// files `inputs`.
+    ///
+    /// # Errors
+    /// Those of [`Self::check`], and fails if nothing can be written there, if another run writes there, or if the range
+    /// scale is invalid.
+    pub fn create(
+        folder: &Path,
+        settings: &Settings,
+        source: &dyn PhotonSource,
+        inputs: Vec<PathBuf>,
+    ) -> Result<Self> {
+        let ranges = settings.ranges(source.array())?;
+        Self::check(folder, &inputs)?;
         fs::create_dir_all(folder)
             .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
-        let inputs: Vec<PathBuf> = input.into_iter().map(Path::to_owned).collect();
-        may_hold_results(folder, &inputs)?;
         let lock = lock(folder, &inputs)?;
         let array = source.array();
         let name = || folder.display().to_string();
@@ -136,15 +149,11 @@ impl Output {
         })
     }
 
-    /// Writes `requested` as the settings file; it was read from `file`, if there is one.
-    ///
-    /// # Errors
-    /// Fails if a result would replace `file`.
-    pub fn with_settings(mut self, requested: SettingsFile, file: Option<&Path>) -> Result<Self> {
-        self.settings = requested;
-        self.inputs.extend(file.map(Path::to_owned));
-        may_hold_results(&self.folder, &self.inputs)?;
-        Ok(self)
+    /// Writes `requested` as the settings file.
+    #[must_use]
+    pub fn with_settings(self, requested: SettingsFile) -> Self {
+        let settings = requested;
+        Self { settings, ..self }
     }
 
     /// Shows dynamic depth in the report, if there are `options` for it.

@@ -10,7 +10,7 @@ use clap::Args;
 use dtof::path;
 use dtof::progress::Bar;
 use dtof_calibrate::remarks;
-use dtof_data::options::files::{MarkedFile, write_marked};
+use dtof_data::options::files::{MarkedFile, destination, may_replace, write_marked};
 use dtof_data::options::rows::aligned;
 use dtof_engine::settings::SettingsFile;
 use dtof_run::calibrate::report::{self, MARKS};
@@ -54,6 +54,11 @@ impl Calibrate {
 
     fn calibrate(&self, requested: &SettingsFile, older: Option<SettingsFile>) -> Result<()> {
         let input = self.recorded.file();
+        let place = self.report.clone();
+        let place = place.unwrap_or_else(|| self.out.with_extension("html"));
+        let inputs = [input, self.settings.as_deref()];
+        let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
+        self.check_places(&place, &inputs)?;
         let name = input.map(|input| input.display().to_string());
         let name = name.or(self.from_device.device.clone()).unwrap_or_default();
         let (found, settings, collected) = match input {
@@ -86,15 +91,6 @@ impl Calibrate {
         };
         let changes = older.map_or(Vec::new(), |older| report::changes(&settings, &older));
         let page = report::page(&found, &settings, &changes, &name)?;
-        let place = self.report.clone();
-        let place = place.unwrap_or_else(|| self.out.with_extension("html"));
-        ensure!(
-            place != self.out,
-            "{}: settings and report need two names",
-            place.display()
-        );
-        let inputs = [input, self.settings.as_deref()];
-        let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
         // The report of the older settings goes first: a report is that of the settings beside it.
         let text = settings.to_toml()?;
         let report = MarkedFile {
@@ -123,6 +119,20 @@ impl Calibrate {
             }
             writeln!(out, "\nOpen {} in a browser.", place.display())?;
             out.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Checks that settings and report may be written, before anything is read: the report to `report`.
+    fn check_places(&self, report: &Path, inputs: &[&Path]) -> Result<()> {
+        ensure!(
+            report != self.out,
+            "{}: settings and report need two names",
+            report.display()
+        );
+        for (place, mark) in [&*self.out, report].into_iter().zip(MARKS) {
+            may_replace(place, mark, inputs)?;
+            destination(place, inputs)?;
         }
         Ok(())
     }

@@ -70,9 +70,8 @@ impl Demo {
         };
         Job {
             simulation: Simulation::new(scene, settings, requested, None)?,
-            input: None,
+            inputs: [None; 2],
             scene_rows: Vec::new(),
-            settings_file: None,
             engine: &self.engine,
             results: &results,
             lead: &lead,

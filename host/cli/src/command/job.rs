@@ -72,29 +72,43 @@ impl ResultOptions {
         })
     }
 
-    /// Prepares the folder for a job that reads `input` and a settings file. From now on Ctrl-C ends the photons, and
-    /// the job finishes its files.
+    /// Refuses wrong options, and a folder that may not hold the results of `inputs`, before anything is read.
     ///
     /// # Errors
-    /// Fails if an option does not suit the others, or the folder cannot be written.
+    /// Fails if an option does not suit the others, or a result would replace a file that is not one.
+    pub fn check(&self, [input, settings_file]: Inputs) -> Result<()> {
+        self.dynamic_depth.get()?;
+        Output::check(&self.folder(input), &files([input, settings_file]))
+    }
+
+    /// Prepares the folder for a job that reads `inputs`. From now on Ctrl-C ends the photons, and the job finishes its
+    /// files.
+    ///
+    /// # Errors
+    /// Those of [`Self::check`], and fails if the folder cannot be written.
     pub fn output(
         &self,
         settings: &Settings,
         photons: &dyn PhotonSource,
-        input: Option<&Path>,
         effective: SettingsFile,
-        settings_file: Option<&Path>,
+        [input, settings_file]: Inputs,
     ) -> Result<Output> {
         // Before the first file: nothing would remove it.
         interrupt::handle_ctrl_c()?;
-        Ok(
-            Output::create(&self.folder(input), settings, photons, input)?
-                .with_settings(effective, settings_file)?
-                .with_changes(self.dynamic_depth.get()?.as_ref())?
-                .with_echo(self.echo, settings)
-                .without_csv(self.no_csv),
-        )
+        let (folder, inputs) = (self.folder(input), files([input, settings_file]));
+        Ok(Output::create(&folder, settings, photons, inputs)?
+            .with_settings(effective)
+            .with_changes(self.dynamic_depth.get()?.as_ref())?
+            .with_echo(self.echo, settings)
+            .without_csv(self.no_csv))
     }
+}
+
+/// The recording or scene that a job reads, and its settings file.
+pub type Inputs<'a> = [Option<&'a Path>; 2];
+
+fn files(inputs: Inputs) -> Vec<PathBuf> {
+    inputs.into_iter().flatten().map(Path::to_owned).collect()
 }
 
 /// The computer or device that decides.

@@ -34,18 +34,17 @@ impl Replay {
     }
 
     fn replay(&self, requested: &SettingsFile) -> Result<()> {
-        // Wrong options are refused before anything is read.
-        self.results.dynamic_depth.get()?;
         let file = self.recorded.file();
         let file = file.ok_or_else(|| missing("<FILE>", "is needed"))?;
+        let inputs = [Some(file), self.options.0.given.file.as_deref()];
+        self.results.check(inputs)?;
         let input = Input::from(file);
         let mut replay = self.options.0.open(&input, requested)?;
         let mut output = self.results.output(
             &replay.settings,
             &replay.photons,
-            Some(file),
             replay.requested.with_settings(&replay.settings),
-            self.options.0.given.file.as_deref(),
+            inputs,
         )?;
         let quiet = self.results.quiet;
         warn(file, warnings(&replay.metadata), quiet);

@@ -15,7 +15,7 @@ use dtof_run::report::Section;
 use dtof_run::simulate::{Options, Simulation};
 
 use super::flags::Flags;
-use super::job::{EngineOptions, ResultOptions};
+use super::job::{EngineOptions, Inputs, ResultOptions};
 use super::scene_options::SceneOptions;
 use super::{check_complete, print_summary, say_kept, warn};
 
@@ -42,13 +42,13 @@ impl Simulate {
     }
 
     fn simulate(&self, requested: SettingsFile) -> Result<()> {
-        // Wrong options are refused before anything is read.
-        self.results.dynamic_depth.get()?;
-        let scene = self.scene_options.scene(self.scene.as_deref())?;
         let input = self
             .scene
             .as_deref()
             .or(self.scene_options.depth.as_deref());
+        let inputs = [input, self.options.0.given.file.as_deref()];
+        self.results.check(inputs)?;
+        let scene = self.scene_options.scene(self.scene.as_deref())?;
         let name = input.unwrap_or(Path::new("")).display().to_string();
         let simulation = self.options.0.open(scene, &name, requested)?;
         let files = self.scene_options.files(self.scene.as_deref());
@@ -59,9 +59,8 @@ impl Simulate {
             ""
         };
         Job {
-            input,
+            inputs,
             scene_rows: self.scene_options.rows(&simulation.scene),
-            settings_file: self.options.0.given.file.as_deref(),
             engine: &self.engine,
             results: &self.results,
             lead: &format!("Simulated photons of {files}, {columns}×{rows} macropixels{laser}."),
@@ -74,11 +73,9 @@ impl Simulate {
 /// A simulation and how its results are written.
 pub struct Job<'a> {
     pub simulation: Simulation,
-    /// The file of the scene, if any.
-    pub input: Option<&'a Path>,
+    pub inputs: Inputs<'a>,
     /// Rows of the report on options of the scene.
     pub scene_rows: Vec<Row>,
-    pub settings_file: Option<&'a Path>,
     pub engine: &'a EngineOptions,
     pub results: &'a ResultOptions,
     /// The first sentence of the report.
@@ -94,12 +91,12 @@ impl Job<'_> {
         let (photons, settings) = (&simulation.photons, &simulation.settings);
         let mut engine = self.engine.engine(settings, photons)?;
         let effective = simulation.requested.with_settings(settings);
-        let mut output =
-            self.results
-                .output(settings, photons, self.input, effective, self.settings_file)?;
+        let mut output = self
+            .results
+            .output(settings, photons, effective, self.inputs)?;
         let progress = &mut Bar::new(self.results.quiet);
         let ran = simulation.run(engine.as_mut(), &mut output, progress)?;
-        warn(self.input, ran.warnings, self.results.quiet);
+        warn(self.inputs[0], ran.warnings, self.results.quiet);
         let mut summary = ran.summary;
         summary.export_with = export_with(&simulation.scene);
         let mut rows = self.scene_rows;
@@ -111,7 +108,7 @@ impl Job<'_> {
         }];
         let kept = output.finish(&summary, summary.settings.title(), self.lead, &sections)?;
         say_kept(kept.as_deref(), self.results.quiet)?;
-        let folder = self.results.folder(self.input);
+        let folder = self.results.folder(self.inputs[0]);
         if !self.results.quiet {
             print_summary(&summary, &rows, &folder)?;
         }

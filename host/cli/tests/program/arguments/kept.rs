@@ -122,9 +122,17 @@ fn a_file_of_somebody_else_is_kept() {
         }
     }
     let scratch = Scratch::new();
-    scratch.file("out/demo/report.html", "mine\n");
     let name = "out/demo/report.html";
+    scratch.file(name, "mine\n");
+    scratch.file("own.toml", "mine\n");
     kept(&scratch, "demo --cycles 200", name, "was not written");
+    // This is found before anything is read: there is no such recording.
+    let line = "replay missing.npy --out out/demo";
+    kept(&scratch, line, name, "was not written");
+    let line = "simulate --scene missing.toml --out out/demo";
+    kept(&scratch, line, name, "was not written");
+    let line = "calibrate missing.npy --out own.toml";
+    kept(&scratch, line, "own.toml", "was not written");
 }
 
 #[test]
@@ -246,7 +254,7 @@ fn a_folder_that_cannot_be_completed_is_left_as_it_was() {
     let summary = Summary::new(Default::default(), source.as_ref(), 0, &settings);
     let before = scratch.read("out/summary.json");
     let finish = |come: &dyn Fn()| {
-        let output = Output::create(&out, &settings, source.as_ref(), None).unwrap();
+        let output = Output::create(&out, &settings, source.as_ref(), Vec::new()).unwrap();
         fs::remove_file(out.join("report.html")).unwrap();
         come();
         let error = output.finish(&summary, "", "", &[]).unwrap_err();

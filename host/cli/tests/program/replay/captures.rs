@@ -97,9 +97,8 @@ fn one_capture_of_several_can_be_chosen() {
     );
     std::fs::remove_dir_all(scratch.path("out")).unwrap();
     for part in ["calibrate", "compare"] {
-        let line = format!(
-            "{part} all.npy --capture 3 --axes captures,rows,columns,bins --out new/x.toml"
-        );
+        let line =
+            format!("{part} all.npy --capture 3 --axes captures,rows,columns,bins --out x.toml");
         scratch.refused(
             &scratch.run(&line),
             &["--capture 3: there are 3, counted from 0"],

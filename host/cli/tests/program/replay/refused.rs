@@ -155,7 +155,7 @@ fn a_pixel_with_more_photons_than_can_be_counted_is_named() {
     for line in [
         "replay h.npy --out out",
         "replay h.npy --out out --settings given.toml",
-        "calibrate h.npy --out out/new.toml --bin-width-ps 250",
+        "calibrate h.npy --out new.toml --bin-width-ps 250",
         "compare h.npy --out out --bin-width-ps 250",
     ] {
         scratch.refused(&scratch.run(line), &[named]);
