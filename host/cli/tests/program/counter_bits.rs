@@ -35,16 +35,3 @@ fn events_are_those_of_10_bits_until_a_counter_is_full() {
     scratch.simulated(&bright, "--rule window --window 3");
     assert_eq!(scratch.summary()["ended_full"], 0);
 }
-
-#[test]
-fn other_widths_are_refused() {
-    let scratch = Scratch::new();
-    scratch.file("scene.toml", scene(0.02));
-    scratch.all_refused(
-        "simulate --scene scene.toml --out out",
-        "
-        --counter-bits 9 | --counter-bits 9: must be 8 or 10
-        --counter-bits 8 --min-count 256 | --min-count is more than counters of 8 bits hold
-        ",
-    );
-}

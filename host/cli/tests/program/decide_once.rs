@@ -123,29 +123,6 @@ fn all_photons_decide_once_with_settings_from_the_recording() {
 }
 
 #[test]
-fn two_surfaces_are_two_maps() {
-    let scratch = Scratch::new();
-    let scene = scratch.file(
-        "scene.toml",
-        "columns = 8\nrows = 4\nbackground = 0.01\ncycles = 3000\n\
-         [[surface]]\nrange_mm = 3000\nsignal = 0.4\n\
-         [[surface]]\nrange_mm = 1000\nsignal = 0.4\ntransmittance = 0.8\n",
-    );
-    scratch.simulated(
-        &scene,
-        "--decide-once --rule window --sigma-bins 1 --echoes 2",
-    );
-    assert_eq!(scratch.summary()["events"], 64);
-    for (name, truth) in [("depth-nearest", 1000.0), ("depth-farthest", 3000.0)] {
-        let depths = scratch.map(name);
-        assert!(
-            depths.iter().all(|depth| (depth - truth).abs() < 20.0),
-            "{depths:?}"
-        );
-    }
-}
-
-#[test]
 fn photons_of_a_list_are_all_taken() {
     let scratch = Scratch::new();
     let mut list = "pixel,cycle,bin\n".to_owned();
@@ -169,29 +146,6 @@ fn photons_of_a_list_are_all_taken() {
         .map(|event| [&event[0], &event[1], &event[3]])
         .collect();
     assert_eq!(of, [["19999", "0", "60"], ["19999", "1", "60"]]);
-}
-
-#[test]
-fn what_needs_looks_is_refused() {
-    let scratch = Scratch::new();
-    let room = scenes().join("room.npy");
-    for (options, reason) in [
-        ("--binning 2", "--decide-once cannot be used with --binning"),
-        ("--frame 100", "--decide-once cannot be used with --frame"),
-    ] {
-        let line = format!(
-            "replay {} --out out --axes rows,columns,bins --decide-once {options}",
-            room.display()
-        );
-        let output = scratch.run(&line);
-        let message = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(
-            (output.status.code(), message.lines().count()),
-            (Some(1), 1),
-            "{message}"
-        );
-        assert_contains(&message, reason);
-    }
 }
 
 /// The z in a settings file.
@@ -218,17 +172,6 @@ fn a_z_for_looks_and_one_for_a_single_decision_do_not_replace_each_other() {
     // One that is given is kept.
     scratch.replayed(&room, "--settings looks.toml --decide-once --z 5");
     assert_eq!(z(&scratch, "out/dtof.toml"), 5.0);
-
-    // An even background, and the settings of a single decision: 10 exposures of each of 768 pixels.
-    let scene = scratch.file(
-        "dark.toml",
-        "columns = 32\nrows = 24\nbackground = 0.5\n[[surface]]\nrange_mm = 2000\nsignal = 0.0001\n",
-    );
-    let settings = "--settings once.toml --decide-once=false --gate 0..127 --l1 40 --l2 400";
-    scratch.simulated(&scene, &format!("{settings} --cycles 4000"));
-    let summary = scratch.summary();
-    let share = summary["events"].as_f64().unwrap() / (768.0 * 10.0);
-    assert!(share < 0.02, "{share}");
 
     // An older calibration that decided once has no z for looks in the new one.
     scratch.printed(&format!(

@@ -72,19 +72,6 @@ fn dim_pixels_report_much_sooner() {
 }
 
 #[test]
-fn what_they_cannot_be_used_with_is_refused() {
-    let scratch = Scratch::new();
-    scratch.file("scene.toml", SCENE);
-    scratch.all_refused(
-        "simulate --scene scene.toml --out out",
-        "
-        --neighbours 8 | --neighbours is for --rule window
-        --rule window --window 3 --neighbours 8 --binning 1 | --neighbours cannot be used with --binning
-        ",
-    );
-}
-
-#[test]
 fn a_scene_whose_tdc_has_a_dead_time_needs_it_left_out() {
     let scratch = Scratch::new();
     scratch.file("scene.toml", format!("{SCENE}[tdc]\nhits_per_cycle = 1\n"));
@@ -101,7 +88,7 @@ fn settings_with_neighbours_can_be_compared() {
     scratch.file("scene.toml", SCENE);
     scratch.file(
         "settings.toml",
-        "[detection]\nrule = \"window\"\nwindow = 3\nneighbours = 8\n",
+        "[detection]\nrule = \"window\"\nwindow = 3\nneighbours = 8\nl2 = 400\n",
     );
     scratch.printed(
         "compare --scene scene.toml --sigma-bins 1 --cycles 600 --settings settings.toml --out out",

@@ -293,67 +293,6 @@ fn a_second_calibration_keeps_the_offsets_of_the_first() {
     assert!(error < 8.0, "{error}");
 }
 
-#[test]
-fn pixels_that_do_not_differ_get_no_offsets() {
-    let scratch = Scratch::new();
-    for seed in 0..4 {
-        scratch.file(
-            "target.npy",
-            recording(&target(1200.0), &[0.0; PIXELS], seed),
-        );
-        let printed = scratch.printed(&format!(
-            "calibrate target.npy {SENSOR} --target-mm 1200 --fov 41x52 --out dtof.toml"
-        ));
-        assert!(!scratch.read("dtof.toml").contains("offsets_mm"), "{seed}");
-        assert_contains(&printed, "none: pixels differ by no more than their noise");
-    }
-}
-
-/// The bytes of a block of the format's document.
-fn document(fence: &str) -> Vec<u8> {
-    let text = include_str!("../../../../docs/aer-format.md");
-    let (_, block) = text.split_once(&format!("```{fence}\n")).unwrap();
-    let (block, _) = block.split_once("```").unwrap();
-    let bytes = block.split_whitespace();
-    bytes
-        .map(|byte| u8::from_str_radix(byte, 16).unwrap())
-        .collect()
-}
-
-#[test]
-fn the_file_of_the_document_is_decoded_as_it_says() {
-    let scratch = Scratch::new();
-    scratch.file("offsets.aer", document("offsets"));
-    let csv = scratch.printed("decode offsets.aer");
-    let expected = [("1".to_owned(), 2176.43), ("2".to_owned(), 2285.43)];
-    assert_eq!(ranges(&csv), expected, "{csv}");
-}
-
-#[test]
-fn a_list_of_another_length_is_refused() {
-    let scratch = Scratch::new();
-    let file = scratch.file("target.npy", recording(&target(1200.0), &[0.0; PIXELS], 1));
-    let many = "1,".repeat(62);
-    for (options, part) in [
-        (
-            "--offsets-mm=1,2,3".to_owned(),
-            "offsets-mm has 3 numbers, but there are 64 pixels",
-        ),
-        (format!("--offsets-mm={many}1"), "has 63 numbers"),
-        (format!("--offsets-mm={many}1,8388607"), "that of pixel 63"),
-        ("--offsets-mm=a".to_owned(), "must be a number"),
-    ] {
-        let output = scratch.replay(&file, &format!("--l1 40 {options}"));
-        scratch.refused(&output, &[part]);
-    }
-    scratch.file("own.toml", "[sensor]\noffsets_mm = [1, 2.5]\n");
-    let output = scratch.replay(&file, "--settings own.toml");
-    scratch.refused(&output, &["own.toml: offsets_mm has 2 numbers"]);
-    scratch.file("own.toml", "[sensor]\noffsets_mm = 1\n");
-    let output = scratch.replay(&file, "--settings own.toml");
-    scratch.refused(&output, &["own.toml: offsets_mm 1: must be a list"]);
-}
-
 /// Blocks have the mean offset of their pixels that are not left out.
 #[test]
 fn events_of_blocks_and_captures_have_the_offsets_of_their_pixels() {

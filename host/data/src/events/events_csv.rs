@@ -187,7 +187,7 @@ mod tests {
     /// All fractions of 256 with whole numbers of each length, and below 0: those that stand between two numbers, too.
     #[test]
     fn decimals_are_those_of_the_standard_library() {
-        let wholes = (0..40).flat_map(|bits| [(1u64 << bits) / 256 - 0, 10u64.pow(bits / 4)]);
+        let wholes = (0..40).flat_map(|bits| [(1u64 << bits) / 256, 10u64.pow(bits / 4)]);
         for whole in wholes {
             for part in 0..256u16 {
                 for sign in [1.0, -1.0] {

@@ -1,10 +1,11 @@
 //! No command replaces a file that it reads, nor one in its folder that it did not write.
 
 use std::fs;
+use std::path::PathBuf;
 use std::process::Stdio;
 
 use crate::common::aer::{HEADER, events, file};
-use crate::common::{Scratch, assert_contains, names};
+use crate::common::{Scratch, assert_contains, names, npy};
 use dtof_data::photons::open::{ReadOptions, open};
 use dtof_engine::settings::Settings;
 use dtof_run::output::Output;
@@ -45,8 +46,15 @@ fn kept(scratch: &Scratch, line: &str, name: &str, reason: &str) {
     assert_eq!(scratch.read(name), before);
 }
 
-const REPLAY: &str = "replay --input photons.csv --out out --rule paper";
+/// Settings that leave all to the defaults: nothing is searched.
+const REPLAY: &str = "replay --input photons.csv --out out --settings defaults.toml";
 const READ: &str = "is an input file";
+
+/// What [`REPLAY`] reads.
+fn photons(scratch: &Scratch) -> PathBuf {
+    scratch.file("defaults.toml", "");
+    scratch.file("photons.csv", PHOTONS)
+}
 
 #[test]
 fn a_recording_in_the_output_folder_is_kept() {
@@ -76,7 +84,7 @@ fn a_recording_in_the_output_folder_is_kept() {
 fn links_hide_no_input() {
     let scratch = Scratch::new();
     fs::create_dir(scratch.path("out")).unwrap();
-    scratch.file("photons.csv", PHOTONS);
+    photons(&scratch);
     scratch.file("scene.toml", SCENE);
     std::os::unix::fs::symlink("../photons.csv", scratch.path("out/summary.json")).unwrap();
     kept(&scratch, REPLAY, "out/summary.json", READ);
@@ -101,10 +109,10 @@ fn a_scene_in_the_output_folder_is_kept() {
 #[test]
 fn settings_in_the_output_folder_are_kept() {
     let scratch = Scratch::new();
-    scratch.file("photons.csv", PHOTONS);
+    photons(&scratch);
     scratch.file("out/dtof.toml", "# dtof settings\n");
-    let line = format!("{REPLAY} --settings out/dtof.toml");
-    kept(&scratch, &line, "out/dtof.toml", READ);
+    let line = "replay --input photons.csv --out out --settings out/dtof.toml";
+    kept(&scratch, line, "out/dtof.toml", READ);
 }
 
 #[test]
@@ -116,7 +124,7 @@ fn a_file_of_somebody_else_is_kept() {
             let scratch = Scratch::new();
             let result = format!("out/{name}");
             scratch.file(&result, text);
-            scratch.file("photons.csv", PHOTONS);
+            photons(&scratch);
             kept(&scratch, REPLAY, &result, "was not written by this program");
             assert_eq!(names(&scratch.path("out")), [name]);
         }
@@ -138,7 +146,7 @@ fn a_file_of_somebody_else_is_kept() {
 #[test]
 fn settings_that_a_run_would_replace_are_kept_under_another_name() {
     let scratch = Scratch::new();
-    scratch.file("photons.csv", PHOTONS);
+    photons(&scratch);
     scratch.printed(REPLAY);
     let first = scratch.read("out/dtof.toml");
     // Nothing is kept of what is the same.
@@ -165,8 +173,8 @@ fn settings_that_a_run_would_replace_are_kept_under_another_name() {
 #[test]
 fn settings_that_a_calibration_would_replace_are_kept_under_another_name() {
     let scratch = Scratch::new();
-    scratch.file("photons.csv", PHOTONS);
-    let calibrate = "calibrate photons.csv --out own.toml";
+    scratch.file("even.npy", npy("|u1", "(8, 8, 32)", &[4; 2048]));
+    let calibrate = "calibrate even.npy --out own.toml";
     scratch.printed(calibrate);
     let first = scratch.read("own.toml");
     scratch.printed(calibrate);
@@ -192,10 +200,12 @@ fn settings_that_a_calibration_would_replace_are_kept_under_another_name() {
 #[test]
 fn runs_that_begin_together_leave_no_mixture() {
     let scratch = Scratch::new();
-    scratch.file("photons.csv", PHOTONS);
+    photons(&scratch);
     for round in 0..8 {
         let runs = ["8", "16"].map(|l1| {
-            let line = format!("replay photons.csv --quiet --out {round} --l1 {l1}");
+            let line = format!(
+                "replay photons.csv --quiet --out {round} --settings defaults.toml --l1 {l1}"
+            );
             let run = scratch.command(&line).stderr(Stdio::null()).spawn();
             (l1, run.unwrap())
         });
@@ -223,14 +233,14 @@ fn runs_that_begin_together_leave_no_mixture() {
 #[test]
 fn results_of_an_earlier_run_are_replaced() {
     let scratch = Scratch::new();
-    let photons = scratch.file("photons.csv", PHOTONS);
-    scratch.replayed(&photons, "");
+    photons(&scratch);
+    scratch.printed(REPLAY);
     assert_eq!(names(&scratch.path("out")), RESULTS);
     scratch.file("out/notes.txt", "mine\n");
-    scratch.replayed(&photons, "--l1 8");
+    scratch.printed(&format!("{REPLAY} --l1 8"));
     for name in "summary.json report.html events.aer depth-last.svg".split(' ') {
         fs::remove_file(scratch.path("out").join(name)).unwrap();
-        scratch.replayed(&photons, "");
+        scratch.printed(REPLAY);
     }
     assert_eq!(scratch.read("out/notes.txt"), "mine\n");
     // This holds for files of another command of this program, too.
@@ -242,8 +252,8 @@ fn results_of_an_earlier_run_are_replaced() {
 #[test]
 fn a_folder_that_cannot_be_completed_is_left_as_it_was() {
     let scratch = Scratch::new();
-    let photons = scratch.file("photons.csv", PHOTONS);
-    scratch.replayed(&photons, "");
+    let photons = photons(&scratch);
+    scratch.printed(REPLAY);
     let options = ReadOptions {
         cycles: Some(1),
         ..ReadOptions::default()

@@ -156,27 +156,6 @@ fn what_contradicts_the_file_is_refused() {
     );
 }
 
-#[test]
-fn an_option_switches_off_what_a_file_has_with_its_numbers() {
-    let scratch = Scratch::new();
-    photons(&scratch);
-    let text = "[detection]\nbinning = 2\npatience = 32\nechoes = 2\necho_wait = 4\n[sensor]\ncolumns = 2\n";
-    scratch.file("on.toml", text);
-    let replay = "replay photons.csv --out out --settings on.toml";
-    scratch.printed(&format!("{replay} --binning 0 --echoes 1"));
-    let settings = &scratch.summary()["settings"];
-    assert_eq!(
-        (&settings["binning"], &settings["echoes"]),
-        (&0.into(), &1.into())
-    );
-    let refused = scratch.run(&format!("{replay} --binning 0 --patience 8"));
-    assert!(
-        String::from_utf8(refused.stderr)
-            .unwrap()
-            .contains("--patience is for --binning")
-    );
-}
-
 /// A bin width from an option is that of the recording's bins, one from a file that of rebinned bins.
 #[test]
 fn a_width_and_rebin_are_those_of_one_place_for_every_command() {

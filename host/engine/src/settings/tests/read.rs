@@ -182,6 +182,7 @@ fn a_toml_value_is_one_value_a_list_or_in_quotes_as_its_key_needs() {
         gate = [3]         | gate 3: must be FIRST..LAST, as 20..119; in a file [20, 119]
         gate = [[3], [9]]  | gate [3],[9]: must be FIRST..LAST, as 20..119; in a file [20, 119]
         masked = 3         | masked 3: must be a list
+        offsets_mm = 1     | offsets_mm 1: must be a list
         masked = ['']      | masked : must be a whole number from 0 to 65535
         masked = ['3']     | masked 3: must not be in quotes
         l1 = '40'          | l1 40: must not be in quotes
