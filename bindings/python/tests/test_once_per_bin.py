@@ -1,10 +1,9 @@
-"""Right events in rain if photons of one laser cycle in one bin count once, with photons that numpy draws.
+"""Photons of one laser cycle in one bin count once, in rain that numpy draws.
 
 A drop sends tens of photons back in one laser cycle. Nothing here is shared with the simulator.
 """
 
 import warnings
-from math import sqrt
 
 import numpy
 import pytest
@@ -47,66 +46,6 @@ def photons(random, signal, has_rain, cycles):
     return cycle[inside][order], bin[inside][order]
 
 
-def interval(count, of):
-    """The interval of Wilson for a share, that of 95 %."""
-    share, z = count / of, 1.96
-    middle = (share + z * z / (2 * of)) / (1 + z * z / of)
-    half = z * sqrt(share * (1 - share) / of + z * z / (4 * of * of)) / (1 + z * z / of)
-    return max(0, middle - half), middle + half
-
-
-class Run:
-    """Events of a target: wrong are those more than three bins off."""
-
-    def __init__(self, name, photons, cycles, once_per_bin):
-        cycle, bin = photons
-        self.done = dtof.photons(
-            numpy.zeros_like(bin), cycle, bin, cycles=cycles, columns=1, once_per_bin=once_per_bin, **WINDOW
-        )
-        is_wrong = numpy.abs(self.done.events["depth_bins"] - PLACE) > 3
-        self.wrong = is_wrong.mean()
-        low, high = interval(is_wrong.sum(), is_wrong.size)
-        # Laser cycles from one right event to the next, with the interval of 95 % of their mean.
-        waits = numpy.diff(self.done.events["cycle"][~is_wrong].astype(float))
-        self.wait = waits.mean()
-        half = 1.96 * waits.std() / sqrt(waits.size)
-        print(
-            f"{name}: {is_wrong.sum()} of {is_wrong.size} wrong ({100 * low:.2f} to {100 * high:.2f} %), "
-            f"{self.wait:.1f} ± {half:.1f} laser cycles a right event"
-        )
-
-
-def test_the_generator_has_drops():
-    random = numpy.random.default_rng(1)
-    cycle, bin = drops(random, 400_000)
-    wet, number = numpy.unique(cycle, return_counts=True)
-    # 2000 drops with a standard deviation of 45, of 30 photons.
-    assert abs(wet.size - 2000) < 180
-    assert abs(number.mean() - DROP) < 0.5
-    assert bin.min() < 4 and 62 < bin.max() < PLACE - 8
-    spread = [bin[cycle == one].std() for one in wet[:300]]
-    assert abs(numpy.mean(spread) - 1) < 0.06
-    cycle, _ = photons(random, 0.5, False, 20_000)
-    assert abs(cycle.size / 20_000 - 6.9) < 0.1
-
-
-@pytest.mark.parametrize("signal,cycles", [(0.5, 300_000), (0.145, 1_200_000)])
-def test_rain_makes_no_events(signal, cycles):
-    random = numpy.random.default_rng(2)
-    dry = photons(random, signal, False, cycles)
-    wet = photons(random, signal, True, cycles)
-    counted, once, dry_counted, dry_once = (
-        Run(f"signal {signal}, {light}, {'once per bin' if is_once else 'every photon'}", of, cycles, is_once)
-        for light, of in (("rain", wet), ("dry", dry))
-        for is_once in (False, True)
-    )
-    assert counted.wrong > 0.1
-    assert once.wrong <= 0.012
-    assert dry_once.wait <= 1.15 * dry_counted.wait
-    assert once.done.statistics["settings"]["once_per_bin"] is True
-    assert counted.done.statistics["settings"]["once_per_bin"] is False
-
-
 def test_photons_that_repeat_are_as_if_they_were_not_there():
     cycle, bin = photons(numpy.random.default_rng(3), 0.5, True, 20_000)
     pixel = numpy.arange(bin.size) % 3
@@ -115,6 +54,8 @@ def test_photons_that_repeat_are_as_if_they_were_not_there():
     without = dtof.photons(pixel, cycle, bin, cycles=20_000, columns=3, **WINDOW)
     assert len(once.events) > 50
     assert (once.events == without.events).all()
+    assert once.statistics["settings"]["once_per_bin"] is True
+    assert without.statistics["settings"]["once_per_bin"] is False
     # Each photon is counted as one of them.
     assert once.statistics["repeated"] > 1000 and without.statistics["repeated"] == 0
     assert once.statistics["photons"] - once.statistics["repeated"] == without.statistics["photons"]

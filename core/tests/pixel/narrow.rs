@@ -1,9 +1,10 @@
 //! Counters of 8 bits beside those of 10: the same until one of them has lost a photon.
 
+use dtof_core::binning::Block;
 use dtof_core::fixed::types::U4F12;
 use dtof_core::{
-    AnyRule, AsyncPixel, Count, Count8, Flags, LaserCycle, Look, PixelAddress, PixelConfig,
-    RangeGate, Statistics, WindowRule,
+    AnyRule, AsyncPixel, Count, Count8, DepthEvent, Flags, LaserCycle, Look, PixelAddress,
+    PixelConfig, PixelPlace, RangeGate, Statistics, WindowRule,
 };
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -228,4 +229,12 @@ fn a_macropixel_of_128_bins_takes_192_bytes() {
     assert_eq!(size_of::<AsyncPixel<128, Count8>>(), 128 + 64);
     assert_eq!(size_of::<AsyncPixel<1024, Count8>>(), 1024 + 64);
     assert_eq!(size_of::<AsyncPixel<128>>(), 256 + 64);
+    let statement = "macropixel of 128 bins takes 320 bytes, with 8-bit counters 192.";
+    assert!(include_str!("../../../README.md").contains(statement));
+    assert!(include_str!("../../README.md").contains(statement));
+    // In an array that is driven, and for a block of pixels.
+    assert_eq!(size_of::<PixelPlace<128>>(), 320 + 12);
+    assert!(include_str!("../../README.md").contains("In an array it takes 12 more."));
+    assert_eq!(size_of::<Block<128>>(), 320 + 4);
+    assert_eq!(size_of::<DepthEvent>(), 28);
 }

@@ -9,6 +9,8 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
+use crate::modules;
+
 type Arrows = BTreeMap<String, BTreeSet<String>>;
 
 fn root() -> PathBuf {
@@ -16,23 +18,23 @@ fn root() -> PathBuf {
 }
 
 /// The packages of the workspace from `cargo metadata`.
-fn metadata() -> Value {
+pub static PACKAGES: LazyLock<Vec<Value>> = LazyLock::new(|| {
     let output = Command::new(env!("CARGO"))
         .current_dir(root())
         .args(["metadata", "--no-deps", "--format-version", "1", "--locked"])
         .output()
         .unwrap();
     assert!(output.status.success(), "cargo metadata: {output:?}");
-    serde_json::from_slice(&output.stdout).unwrap()
-}
+    let metadata: Value = serde_json::from_slice(&output.stdout).unwrap();
+    metadata["packages"].as_array().unwrap().clone()
+});
 
 /// The packages of the workspace that each package uses, and that its tests use.
-fn arrows(metadata: &Value) -> (Arrows, Arrows) {
-    let packages = metadata["packages"].as_array().unwrap();
+fn arrows() -> (Arrows, Arrows) {
     let name = |value: &Value| value["name"].as_str().unwrap().to_owned();
-    let ours: BTreeSet<String> = packages.iter().map(name).collect();
+    let ours: BTreeSet<String> = PACKAGES.iter().map(name).collect();
     let (mut built, mut tested) = (Arrows::new(), Arrows::new());
-    for package in packages {
+    for package in &*PACKAGES {
         let of_tests = |dependency: &&Value| dependency["kind"] == "dev";
         let used = package["dependencies"].as_array().unwrap();
         let (tests, code): (Vec<&Value>, Vec<&Value>) = used
@@ -101,16 +103,22 @@ fn wrong(documented: &[[String; 3]], built: &Arrows, tested: &Arrows) -> Vec<Str
 
 #[test]
 fn packages_use_what_the_table_says_and_only_what_is_above_them() {
-    let (built, tested) = arrows(&metadata());
+    let (mut built, tested) = arrows();
     assert_eq!(wrong(&documented(), &built, &tested), [""; 0]);
+    // An arrow that is turned round is found.
+    built.get_mut("dtof-engine").unwrap().remove("dtof-core");
+    built
+        .get_mut("dtof-core")
+        .unwrap()
+        .insert("dtof-engine".to_owned());
+    let expected = "dtof-core uses dtof-engine, which is not above it".to_owned();
+    assert!(wrong(&documented(), &built, &tested).contains(&expected));
 }
 
 /// Each crate of others that a manifest names has a row that says why.
 #[test]
 fn each_dependency_has_a_reason() {
-    let metadata = metadata();
-    let packages = metadata["packages"].as_array().unwrap();
-    let used: BTreeSet<&str> = packages
+    let used: BTreeSet<&str> = PACKAGES
         .iter()
         .flat_map(|package| package["dependencies"].as_array().unwrap())
         .filter(|dependency| dependency["path"].is_null())
@@ -125,128 +133,71 @@ fn each_dependency_has_a_reason() {
     assert_eq!(BTreeSet::from_iter(listed), used);
 }
 
-#[test]
-fn an_arrow_that_is_turned_round_is_found() {
-    let (built, tested) = arrows(&metadata());
-    let arrows = built
-        .iter()
-        .flat_map(|(from, to)| to.iter().map(move |to| (from, to)));
-    let mut turned = 0;
-    for (from, to) in arrows {
-        let mut built = built.clone();
-        built.get_mut(from).unwrap().remove(to);
-        built.get_mut(to).unwrap().insert(from.clone());
-        let wrong = wrong(&documented(), &built, &tested);
-        let expected = format!("{to} uses {from}, which is not above it");
-        assert!(wrong.contains(&expected), "{wrong:?}");
-        turned += 1;
-    }
-    assert!(turned >= 15, "{turned} arrows");
-}
+/// Crates of others that only a few packages use: the rest reads options by key and text, and listens to nobody.
+const OF_FEW: [(&str, &[&str]); 7] = [
+    ("clap", &["dtof", "dtof-lab"]),
+    ("hyper", &["dtof-live"]),
+    ("hyper-util", &["dtof-live"]),
+    ("indicatif", &["dtof", "dtof-lab"]),
+    ("serialport", &["dtof-device"]),
+    ("tokio-tungstenite", &["dtof-live"]),
+    ("tungstenite", &["dtof"]),
+];
 
-/// Each package with the imports of its files. Tests share them: to parse all files takes longest.
-static GRAPHS: LazyLock<Vec<(String, crate::modules::Imports)>> = LazyLock::new(|| {
-    let metadata = metadata();
-    let of = |package: &Value| {
-        let manifest = Path::new(package["manifest_path"].as_str().unwrap());
-        let graph = crate::modules::imports(&manifest.parent().unwrap().join("src"));
-        (package["name"].as_str().unwrap().to_owned(), graph)
-    };
-    let packages = metadata["packages"].as_array().unwrap();
-    packages.iter().map(of).collect()
-});
+#[test]
+fn what_only_the_program_and_its_page_need_is_used_by_them_alone() {
+    for (name, users) in OF_FEW {
+        let uses = |package: &&Value| {
+            let mut used = package["dependencies"].as_array().unwrap().iter();
+            used.any(|dependency| dependency["name"] == name)
+        };
+        let mut found: Vec<&str> = PACKAGES
+            .iter()
+            .filter(uses)
+            .map(|package| package["name"].as_str().unwrap())
+            .collect();
+        found.sort_unstable();
+        assert_eq!(found, users, "{name}");
+    }
+}
 
 #[test]
 fn no_files_or_folders_of_a_package_import_each_other_in_a_circle() {
-    let files: usize = GRAPHS.iter().map(|(_, graph)| graph.len()).sum();
+    let mut files = 0;
+    for package in &*PACKAGES {
+        let manifest = Path::new(package["manifest_path"].as_str().unwrap());
+        let graph = modules::imports(&manifest.parent().unwrap().join("src"));
+        files += graph.len();
+        assert_eq!(
+            modules::circles(&graph),
+            [[""; 0]; 0],
+            "{}",
+            package["name"]
+        );
+    }
     assert!(files > 100, "{files} files");
-    for (package, graph) in &*GRAPHS {
-        assert_eq!(crate::modules::circles(graph), [[""; 0]; 0], "{package}");
-    }
 }
 
-/// Adds the reverse of each import: between the same two files, and between two others of the same
-/// folders. Each must be found as a cycle.
+/// Of files, of folders whose files are not the same, and none: a folder may use its own files.
 #[test]
-fn a_planted_circle_of_files_or_of_folders_is_found() {
-    let (mut of_files, mut of_folders) = (0, 0);
-    for (_, graph) in &*GRAPHS {
-        for (from, to) in graph
-            .iter()
-            .flat_map(|(from, to)| to.iter().map(move |to| (from, to)))
-        {
-            let depth = from
-                .iter()
-                .zip(to)
-                .take_while(|(one, other)| one == other)
-                .count();
-            // A folder may use its own files.
-            let (Some(one), Some(other)) = (from.get(..=depth), to.get(..=depth)) else {
-                continue;
-            };
-            let planted = |start: &[String], end: &[String]| {
-                let mut graph = graph.clone();
-                graph.get_mut(start).unwrap().insert(end.to_owned());
-                let circles = crate::modules::circles(&graph);
-                let [one, other] = [one, other].map(|place| place.join("::"));
-                let is_there =
-                    |circle: &Vec<String>| circle.contains(&one) && circle.contains(&other);
-                assert!(
-                    circles.iter().any(is_there),
-                    "{start:?} to {end:?}: {circles:?}"
-                );
-            };
-            planted(to, from);
-            of_files += 1;
-            let beside = |folder: &[String], file| {
-                graph
-                    .keys()
-                    .find(|&module| module.starts_with(folder) && module != file)
-            };
-            if let (Some(start), Some(end)) = (beside(other, to), beside(one, from)) {
-                planted(start, end);
-                of_folders += 1;
-            }
+fn a_circle_of_files_or_of_folders_is_found() {
+    let path = |text: &str| text.split("::").map(str::to_owned).collect::<Vec<_>>();
+    let circles = |arrows: &[(&str, &str)]| {
+        let mut graph = modules::Imports::new();
+        for (from, to) in arrows {
+            graph.entry(path(from)).or_default().insert(path(to));
+            graph.entry(path(to)).or_default();
         }
-    }
-    assert!(
-        of_files > 500 && of_folders > 100,
-        "{of_files}, {of_folders}"
-    );
-}
-
-/// `package` and all packages that it is built with on this computer.
-fn built_with(package: &str) -> BTreeSet<String> {
-    let output = Command::new(env!("CARGO"))
-        .current_dir(root())
-        .args(["tree", "--locked", "--edges", "normal", "--prefix", "none"])
-        .args(["--format", "{p}", "--package", package])
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "cargo tree: {output:?}");
-    let lines = String::from_utf8(output.stdout).unwrap();
-    let names = lines.lines().filter_map(|line| line.split(' ').next());
-    names.map(str::to_owned).collect()
-}
-
-/// Dependencies of the program or the live page. Libraries and Python must not have them: they read
-/// options by key and text.
-const OF_THE_PROGRAM: [&str; 5] = ["clap", "hyper", "indicatif", "serialport", "tungstenite"];
-
-#[test]
-fn libraries_and_python_do_without_what_only_the_program_needs() {
-    let of_program = OF_THE_PROGRAM.map(str::to_owned);
-    let used = |package| {
-        let all = built_with(package);
-        let used = of_program.iter().filter(|name| all.contains(*name));
-        used.cloned().collect::<Vec<_>>()
+        modules::circles(&graph)
     };
-    for package in ["dtof-python", "dtof-run", "dtof-calibrate"] {
-        assert_eq!(used(package), [""; 0], "{package}");
-    }
-    assert_eq!(used("dtof-device"), ["serialport"]);
-    assert_eq!(used("dtof-live"), ["hyper", "serialport"]);
-    let mut with_foxglove = used("dtof");
-    with_foxglove.retain(|name| name != "tungstenite");
-    assert_eq!(with_foxglove, ["clap", "hyper", "indicatif", "serialport"]);
+    let of_files = circles(&[("a::x", "a::y"), ("a::y", "a::z"), ("a::z", "a::x")]);
+    assert_eq!(of_files, [["a::x", "a::y", "a::z"]]);
+    assert_eq!(circles(&[("a::x", "b::x"), ("b::y", "a::z")]), [["a", "b"]]);
+    let none = [
+        ("a::x", "b::x"),
+        ("a::y", "b::y"),
+        ("b::x", "c"),
+        ("a", "a::x"),
+    ];
+    assert_eq!(circles(&none), [[""; 0]; 0]);
 }

@@ -10,4 +10,3 @@ mod modules;
 mod packages;
 mod paper;
 mod scripts;
-mod sizes;

@@ -8,6 +8,8 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use crate::architecture::PACKAGES;
+
 /// Most libraries of the host have an example in their README only.
 fn is_of_host(package: &Value) -> bool {
     let is_of_more = ["dtof", "dtof-draw", "dtof-light"]
@@ -33,12 +35,6 @@ fn cargo(arguments: &[&str]) -> Vec<u8> {
         .unwrap();
     assert!(output.status.success(), "{arguments:?}: {output:?}");
     output.stdout
-}
-
-fn packages() -> Vec<Value> {
-    let arguments = ["metadata", "--no-deps", "--format-version", "1", "--locked"];
-    let metadata: Value = serde_json::from_slice(&cargo(&arguments)).unwrap();
-    metadata["packages"].as_array().unwrap().clone()
 }
 
 fn text<'a>(package: &'a Value, key: &str) -> &'a str {
@@ -152,7 +148,7 @@ fn compiled_from_elsewhere(folder: &Path, files: &BTreeSet<PathBuf>) -> Vec<Stri
 /// A manifest says whether its package is published.
 #[test]
 fn what_a_published_package_uses_is_published() {
-    let packages = packages();
+    let packages = &*PACKAGES;
     let published: Vec<&Value> = packages
         .iter()
         .filter(|package| is_published(package))
@@ -185,7 +181,7 @@ fn the_version_is_the_newest_of_the_changelog() {
     let newest = newest
         .map(|(version, _)| version)
         .find(|name| *name != "Unreleased");
-    for package in &packages() {
+    for package in &*PACKAGES {
         assert_eq!(
             Some(text(package, "version")),
             newest,
@@ -197,7 +193,7 @@ fn the_version_is_the_newest_of_the_changelog() {
 
 #[test]
 fn a_published_package_has_all_that_its_page_and_its_users_need() {
-    let packages = packages();
+    let packages = &*PACKAGES;
     for package in packages.iter().filter(|package| is_published(package)) {
         assert_eq!(lacking(package), [""; 0], "{}", package["name"]);
     }
@@ -210,7 +206,7 @@ fn a_published_package_has_all_that_its_page_and_its_users_need() {
 
 #[test]
 fn a_package_is_small_and_compiles_in_what_is_packed_only() {
-    for package in packages().iter().filter(|package| is_published(package)) {
+    for package in PACKAGES.iter().filter(|package| is_published(package)) {
         let (folder, files) = (folder(package), packed(package));
         for file in ["LICENSE-APACHE", "LICENSE-MIT", "README.md", "src/lib.rs"] {
             assert!(

@@ -77,23 +77,3 @@ fn every_script_is_a_module_and_imports_go_one_way() {
         }
     }
 }
-
-#[test]
-fn a_page_leaves_no_name_but_those_of_its_modules() {
-    for page in pages(&scripts()) {
-        let names: Vec<&str> = page
-            .lines()
-            .filter_map(|line| line.strip_suffix(" = (() => {"))
-            .collect();
-        assert!(
-            names.len() > 20 && names.iter().all(|name| name.starts_with("const $")),
-            "{names:?}"
-        );
-        // Everything stands within the function of a module.
-        let rest: Vec<&str> = page
-            .split("\n})();\n")
-            .filter(|module| !module.starts_with("const $"))
-            .collect();
-        assert_eq!(rest, [""]);
-    }
-}

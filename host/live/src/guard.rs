@@ -117,7 +117,7 @@ mod tests {
         for (method, headers) in ok {
             assert_eq!(checked(method, headers), None, "{method} {headers:?}");
         }
-        let refused: [(&str, &[(&str, &str)]); 12] = [
+        let refused: [(&str, &[(&str, &str)]); 14] = [
             ("GET", &[]),
             ("GET", &[("host", "127.0.0.1")]),
             ("GET", &[("host", "127.0.0.1:80")]),
@@ -129,6 +129,8 @@ mod tests {
             ("GET", &[here, ("sec-fetch-site", "cross-site")]),
             ("GET", &[here, ("sec-fetch-site", "same-site")]),
             ("POST", &[here]),
+            ("POST", &[here, ("origin", "http://example.com")]),
+            ("POST", &[("host", "example.com:8000"), own]),
             ("POST", &[here, own, ("sec-fetch-site", "none")]),
         ];
         for (method, headers) in refused {

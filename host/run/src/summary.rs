@@ -397,3 +397,6 @@ impl Summary {
         rows
     }
 }
+
+#[cfg(test)]
+mod tests;

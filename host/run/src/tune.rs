@@ -363,3 +363,6 @@ fn number(value: f64) -> String {
         format!("{value:.3e}")
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,6 +3,5 @@
 mod kept;
 mod mistakes;
 mod numbers;
-mod rule;
 mod settings;
 mod tune;

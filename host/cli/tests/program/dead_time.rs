@@ -54,42 +54,6 @@ fn used(summary: &Value) -> (u64, Option<&str>) {
     )
 }
 
-/// The same refusal by a flag and by a file.
-#[test]
-fn a_dead_time_that_cannot_be_used_is_refused() {
-    let scratch = Scratch::new();
-    photons(&scratch);
-    let short = scratch.file("short.toml", "[sensor]\ndead_time = 20\n");
-    scratch.all_refused(
-        "replay --out out --input photons.csv",
-        "
-        --dead-time 20 --rule paper | --dead-time 20: is for --rule window, unless it is 128 bins or more
-        --dead-time -1 | --dead-time -1: must be a whole number from 0 to 65535
-        --settings short.toml | short.toml: dead_time 20: is for --rule window
-        ",
-    );
-    // 0 overrides the file, and all bins are for any rule.
-    let with = |options: &str| {
-        let options = format!("--settings {} {options}", short.display());
-        scratch.replayed(&scratch.path("photons.csv"), &options)
-    };
-    assert_eq!(used(&with("--dead-time 0")), (0, None));
-    assert_eq!(used(&with("--dead-time 200")), (128, Some("settings")));
-    assert_eq!(used(&with(WINDOW)), (20, Some("settings")));
-}
-
-#[test]
-fn the_key_of_older_files_is_a_tdc_of_the_first_photon() {
-    let scratch = Scratch::new();
-    let input = photons(&scratch);
-    scratch.file("old.toml", "[sensor]\none_hit_tdc = true\n");
-    let summary = scratch.replayed(&input, "--settings old.toml");
-    assert_eq!(used(&summary), (128, Some("settings")));
-    let written = scratch.read("out/dtof.toml");
-    assert_contains(&written, "dead_time = 128");
-    assert!(!written.contains("one_hit"), "{written}");
-}
-
 #[test]
 fn recorded_photons_are_weighed() {
     let scratch = Scratch::new();

@@ -55,17 +55,22 @@ fn piece() -> impl Strategy<Value = Vec<u8>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(100))]
+    #![proptest_config(ProptestConfig::with_cases(40))]
     #[test]
     fn no_request_stops_the_server(pieces in prop::collection::vec(piece(), 0..8)) {
         let live = LIVE.lock().unwrap();
         send(live.port, &pieces.concat());
         prop_assert_eq!(get(live.port, "/page.css").status, 200);
     }
+}
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
     #[test]
     fn no_body_stops_the_server(
-        path in prop::sample::select(vec!["/settings", "/save", "/record", "/play", "/watch"]),
+        path in prop::sample::select(vec![
+            "/settings", "/save", "/record", "/play", "/seek", "/speed", "/watch",
+        ]),
         body in "[ -~]{0,300}",
     ) {
         let live = LIVE.lock().unwrap();

@@ -41,6 +41,7 @@ fn a_recording_is_played_at_its_rate_paused_and_played_again() {
     for _ in 0..5 {
         assert_eq!(page.frame()["events"], frame["events"]);
     }
+    post(live.port, "/speed", "{\"speed\":100.0}");
     assert_contains(&post(live.port, "/play", "{\"on\":true}").body, "playing");
     let frame = page.until("the end", |frame| frame["connection"]["state"] == "ended");
     assert_eq!(frame["events"], 10);

@@ -22,7 +22,7 @@ fn stopped(page: &mut Stream) -> String {
 #[track_caller]
 fn stays_off_until_settings_are_put_in_force(live: &Live, page: &mut Stream, device: &Plugged) {
     let starts = device.starts.load(Ordering::Relaxed);
-    thread::sleep(Duration::from_millis(2_500));
+    thread::sleep(Duration::from_millis(1_500));
     let arrived = live.hub.arrived();
     thread::sleep(Duration::from_millis(200));
     assert_eq!(live.hub.arrived(), arrived);
@@ -34,7 +34,7 @@ fn stays_off_until_settings_are_put_in_force(live: &Live, page: &mut Stream, dev
         let refused = post(live.port, "/settings", &format!("[detection]\n{settings}"));
         assert_eq!(refused.status, 422, "{refused:?}");
     }
-    thread::sleep(Duration::from_millis(1_500));
+    thread::sleep(Duration::from_millis(1_200));
     assert_eq!(device.starts.load(Ordering::Relaxed), starts);
     // Only the page that has sent them was told why.
     let other = Stream::open(live.port, 2).frame();

@@ -195,6 +195,7 @@ fn what_is_played_is_what_is_exported() {
 
     let sessions = client.infos.len();
     // When played again, time begins again: a new session with the same channels.
+    post(live.port, "/speed", "{\"speed\":100.0}");
     post(live.port, "/play", "{\"on\":true}");
     client.until("again", |data| {
         data.topic == "/statistics" && data.json()["events_so_far"].as_u64() > Some(200)
