@@ -1,6 +1,6 @@
 """A TDC with a dead time, with photons that numpy draws.
 
-The TDC is blind for ``dead_time`` bins after each photon. Nothing here is shared with the simulator.
+Nothing here is shared with the simulator.
 """
 
 from math import erf, sqrt
@@ -21,33 +21,20 @@ def light(background, signal):
     return background / BINS + signal * numpy.diff(below)
 
 
-def photons(random, rates, cycles, dead_time):
-    """Laser cycle and bin of each photon that the TDC is live for."""
+def photons(random, rates, cycles):
+    """Laser cycle and bin of the first photon of each laser cycle: a TDC is blind for all bins after it."""
     arrived = random.poisson(rates.sum(), cycles)
     edges = numpy.cumsum(rates) / rates.sum()
     bins = numpy.minimum(numpy.searchsorted(edges, random.random(arrived.sum())), BINS - 1)
     # In the order of laser cycles, and of bins within each.
-    at, bins = divmod(numpy.sort(numpy.repeat(numpy.arange(arrived.size), arrived) * BINS + bins), BINS)
-    kept = numpy.zeros(at.size, dtype=bool)
-    # The next photon of each laser cycle that has more, the photon after its last, and the first live bin.
-    end = numpy.cumsum(arrived)
-    place = end - arrived
-    live_from = numpy.zeros(arrived.size, dtype=int)
-    while True:
-        more = (place < end) & (live_from < BINS)
-        place, end, live_from = place[more], end[more], live_from[more]
-        if place.size == 0:
-            break
-        is_live = bins[place] >= live_from
-        kept[place[is_live]] = True
-        live_from[is_live] = bins[place[is_live]] + 1 + dead_time
-        place += 1
-    return at[kept], bins[kept]
+    at, bins = divmod(numpy.sort(numpy.repeat(numpy.arange(cycles), arrived) * BINS + bins), BINS)
+    cycle, first = numpy.unique(at, return_index=True)
+    return cycle, bins[first]
 
 
 def test_a_pixel_decides_as_a_replay_and_counts_what_it_cannot_see():
     random = numpy.random.default_rng(4)
-    cycle, bin = photons(random, light(5.5, 0.5), 8000, BINS)
+    cycle, bin = photons(random, light(5.5, 0.5), 8000)
     done = dtof.photons(numpy.zeros_like(bin), cycle, bin, **WINDOW, dead_time=BINS, cycles=8000)
     pixel = dtof.Pixel(**WINDOW, dead_time=BINS)
     ends = numpy.searchsorted(cycle, numpy.arange(8001))

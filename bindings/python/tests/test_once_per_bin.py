@@ -31,15 +31,14 @@ def drops(random, cycles):
     return wet[drop], bin
 
 
-def photons(random, signal, has_rain, cycles):
+def photons(random, cycles):
     """Laser cycle and bin of each photon: an even background, a target, and drops. None is past bin 127."""
     number = random.poisson(BACKGROUND, cycles)
     parts = [
         (numpy.repeat(numpy.arange(cycles), number), random.integers(0, BINS, number.sum())),
-        pulses(random, signal, numpy.full(cycles, PLACE)),
+        pulses(random, 0.5, numpy.full(cycles, PLACE)),
+        drops(random, cycles),
     ]
-    if has_rain:
-        parts.append(drops(random, cycles))
     cycle, bin = (numpy.concatenate(part) for part in zip(*parts))
     inside = (bin >= 0) & (bin < BINS)
     order = numpy.argsort(cycle[inside], kind="stable")
@@ -47,7 +46,7 @@ def photons(random, signal, has_rain, cycles):
 
 
 def test_photons_that_repeat_are_as_if_they_were_not_there():
-    cycle, bin = photons(numpy.random.default_rng(3), 0.5, True, 20_000)
+    cycle, bin = photons(numpy.random.default_rng(3), 20_000)
     pixel = numpy.arange(bin.size) % 3
     once = dtof.photons(pixel, cycle, bin, once_per_bin=True, cycles=20_000, columns=3, **WINDOW)
     cycle, pixel, bin = numpy.unique([cycle, pixel, bin], axis=1)
@@ -62,7 +61,7 @@ def test_photons_that_repeat_are_as_if_they_were_not_there():
 
 
 def test_a_pixel_decides_as_a_replay():
-    cycle, bin = photons(numpy.random.default_rng(4), 0.5, True, 8000)
+    cycle, bin = photons(numpy.random.default_rng(4), 8000)
     options = {**WINDOW, "once_per_bin": True}
     done = dtof.photons(numpy.zeros_like(bin), cycle, bin, cycles=8000, **options)
     pixel = dtof.Pixel(**options)

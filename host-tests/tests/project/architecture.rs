@@ -133,7 +133,7 @@ fn each_dependency_has_a_reason() {
     assert_eq!(BTreeSet::from_iter(listed), used);
 }
 
-/// Crates of others that only a few packages use: the rest reads options by key and text, and listens to nobody.
+/// Crates of others that only these packages use. Libraries and Python must not have them: they read options by key and text.
 const OF_FEW: [(&str, &[&str]); 7] = [
     ("clap", &["dtof", "dtof-lab"]),
     ("hyper", &["dtof-live"]),
@@ -158,6 +158,24 @@ fn what_only_the_program_and_its_page_need_is_used_by_them_alone() {
             .collect();
         found.sort_unstable();
         assert_eq!(found, users, "{name}");
+    }
+    // Not through others either.
+    let output = Command::new(env!("CARGO"))
+        .current_dir(root())
+        .args(["tree", "--locked", "--edges", "normal", "--prefix", "none"])
+        .args(["--format", "{p}", "--package", "dtof-python"])
+        .args(["--package", "dtof-run", "--package", "dtof-calibrate"])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "cargo tree: {output:?}");
+    let tree = String::from_utf8(output.stdout).unwrap();
+    let built: BTreeSet<&str> = tree
+        .lines()
+        .filter_map(|line| line.split(' ').next())
+        .collect();
+    assert!(built.contains("dtof-core"), "{built:?}");
+    for name in ["clap", "hyper", "indicatif", "serialport", "tungstenite"] {
+        assert!(!built.contains(name), "{name}");
     }
 }
 

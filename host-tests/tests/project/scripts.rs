@@ -1,5 +1,5 @@
-//! The scripts of the report and of the live page are modules, which leave no names on a page. `.ci/run` has `oxlint`
-//! look for names that are not defined or not used, and for imports in a circle.
+//! The scripts of the report and of the live page are modules that some page imports. `.ci/run` has `oxlint` look for
+//! names that are not defined or not used, and for imports in a circle.
 
 use std::fs;
 use std::path::{Path, PathBuf};

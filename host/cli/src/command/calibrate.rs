@@ -10,7 +10,7 @@ use clap::Args;
 use dtof::path;
 use dtof::progress::Bar;
 use dtof_calibrate::remarks;
-use dtof_data::options::files::{MarkedFile, destination, may_replace, write_marked};
+use dtof_data::options::files::{MarkedFile, marked_destination, write_marked};
 use dtof_data::options::rows::aligned;
 use dtof_engine::settings::SettingsFile;
 use dtof_run::calibrate::report::{self, MARKS};
@@ -131,8 +131,7 @@ impl Calibrate {
             report.display()
         );
         for (place, mark) in [&*self.out, report].into_iter().zip(MARKS) {
-            may_replace(place, mark, inputs)?;
-            destination(place, inputs)?;
+            marked_destination(place, mark, inputs)?;
         }
         Ok(())
     }

@@ -76,9 +76,9 @@ impl ResultOptions {
     ///
     /// # Errors
     /// Fails if an option does not suit the others, or a result would replace a file that is not one.
-    pub fn check(&self, [input, settings_file]: Inputs) -> Result<()> {
+    pub fn check(&self, inputs: Inputs) -> Result<()> {
         self.dynamic_depth.get()?;
-        Output::check(&self.folder(input), &files([input, settings_file]))
+        Output::check(&self.folder(inputs[0]), &files(inputs))
     }
 
     /// Prepares the folder for a job that reads `inputs`. From now on Ctrl-C ends the photons, and the job finishes its
@@ -91,12 +91,12 @@ impl ResultOptions {
         settings: &Settings,
         photons: &dyn PhotonSource,
         effective: SettingsFile,
-        [input, settings_file]: Inputs,
+        inputs: Inputs,
     ) -> Result<Output> {
         // Before the first file: nothing would remove it.
         interrupt::handle_ctrl_c()?;
-        let (folder, inputs) = (self.folder(input), files([input, settings_file]));
-        Ok(Output::create(&folder, settings, photons, inputs)?
+        let folder = self.folder(inputs[0]);
+        Ok(Output::create(&folder, settings, photons, files(inputs))?
             .with_settings(effective)
             .with_changes(self.dynamic_depth.get()?.as_ref())?
             .with_echo(self.echo, settings)

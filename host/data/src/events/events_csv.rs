@@ -153,12 +153,14 @@ impl Row {
         if value.is_sign_negative() {
             self.0.push(b'-');
         }
-        self.integer(rounded / scale);
-        // The digits after the point, with zeros before them: those of a number one digit longer, without its first.
-        let comma = self.0.len() - 1;
-        self.integer(scale + rounded % scale);
-        self.0.remove(comma);
-        self.0[comma] = b'.';
+        let mut digits = itoa::Buffer::new();
+        self.0
+            .extend_from_slice(digits.format(rounded / scale).as_bytes());
+        self.0.push(b'.');
+        // A 1 before them keeps their zeros.
+        let behind = digits.format(scale + rounded % scale).as_bytes();
+        self.0.extend_from_slice(&behind[1..]);
+        self.0.push(b',');
     }
 
     /// Ends the row, and writes it at once.

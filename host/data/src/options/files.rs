@@ -103,6 +103,15 @@ pub fn may_replace(file: &Path, mark: &str, inputs: &[&Path]) -> Result<()> {
     Ok(())
 }
 
+/// [`destination`] and [`may_replace`] in one.
+///
+/// # Errors
+/// Those of both.
+pub fn marked_destination(file: &Path, mark: &str, inputs: &[&Path]) -> Result<Destination> {
+    may_replace(file, mark, inputs)?;
+    destination(file, inputs)
+}
+
 /// Returns whether nothing is at `file` yet, or a file that has `mark` near its start.
 ///
 /// # Errors
@@ -261,9 +270,8 @@ pub fn write_marked(
         place, text, mark, ..
     } in files
     {
-        may_replace(place, mark, inputs)?;
+        let to = marked_destination(place, mark, inputs)?;
         let name = || place.display().to_string();
-        let to = destination(place, inputs)?;
         let file = temporary_file(&to.folder, ".dtof-").with_context(name)?;
         let mut file = BufWriter::new(file);
         file.write_all(text.as_bytes()).with_context(name)?;
